@@ -1,0 +1,108 @@
+//! The trait `Levels`: the pyramid as everything downstream sees it, wherever it comes from.
+
+use bytemuck::{Pod, Zeroable};
+use half::f16;
+
+use crate::error::{Error, Result};
+use crate::grid::{Grid, Rect};
+
+/// Bounds of one patch of a level, rounded outwards. All NaN where the patch is wholly void.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Bounds {
+    /// Least height of the patch's valid samples, metres less `base_m`.
+    pub min: f32,
+    /// Greatest height of the patch's valid samples, metres less `base_m`.
+    pub max: f32,
+    /// Upper bound of `|S_l - S0|` in metres, over the patch's ground where both exist and at every vertex of
+    /// the next finer level whose morph target on this level is not void.
+    pub error: f32,
+    /// `min`, saturated upwards: never above that of the children and their neighbours.
+    pub need_min: f32,
+    /// `max`, saturated upwards: never below that of the children and their neighbours.
+    pub need_max: f32,
+    /// `error`, saturated upwards: at least 1.3 times that of the children and their neighbours.
+    pub need_error: f32,
+}
+
+impl Bounds {
+    /// The bounds of a patch without any valid sample.
+    pub const VOID: Self = Self {
+        min: f32::NAN,
+        max: f32::NAN,
+        error: f32::NAN,
+        need_min: f32::NAN,
+        need_max: f32::NAN,
+        need_error: f32::NAN,
+    };
+
+    /// Whether the patch has no valid sample.
+    pub fn is_void(&self) -> bool {
+        self.min.is_nan()
+    }
+}
+
+/// Light at a sample: both values in 0 to 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct LightSample {
+    /// Share of the sun's disc above the horizon, times the cosine between normal and sun.
+    pub sun: f16,
+    /// Cosine-weighted share of the sky dome that is seen.
+    pub sky: f16,
+}
+
+/// Whether what was asked for is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[must_use]
+pub enum Arrival {
+    /// The output holds it.
+    Arrived,
+    /// It is not there yet; the output is unspecified. Only sources that never wait answer so.
+    Missing,
+}
+
+/// The levels of a DEM: sizes, heights, bounds and light, by rectangles.
+///
+/// Rectangles must lie within the level. Outputs are row by row, `rect.area()` long. Heights are metres less
+/// [`Grid::base_m`], NaN for no data.
+pub trait Levels: Send + Sync {
+    /// Where the samples lie.
+    fn grid(&self) -> &Grid;
+
+    /// The number of levels, at least 1: those of [`Grid::file_levels`].
+    fn level_count(&self) -> u32 {
+        self.grid().file_levels()
+    }
+
+    /// The heights of `rect` of level `level`.
+    ///
+    /// # Errors
+    /// Where the data are damaged or cannot be read.
+    fn heights(&self, level: u32, rect: Rect, out: &mut [f32]) -> Result<Arrival>;
+
+    /// The bounds of the patches in `patches` (patch indices) of level `level`.
+    ///
+    /// # Errors
+    /// Where the data are damaged or cannot be read.
+    fn bounds(&self, level: u32, patches: Rect, out: &mut [Bounds]) -> Result<Arrival>;
+
+    /// Whether there is light. Without it [`Levels::light`] must not be called.
+    fn has_light(&self) -> bool;
+
+    /// The light of `rect` of level `level`.
+    ///
+    /// # Errors
+    /// Where the data are damaged or cannot be read, or there is no light.
+    fn light(&self, level: u32, rect: Rect, out: &mut [LightSample]) -> Result<Arrival>;
+
+    /// Hears which rectangles will soon be asked for, most urgent first. A source that reads at once ignores it.
+    fn want(&self, wanted: &[(u32, Rect)]) {
+        let _ = wanted;
+    }
+
+    /// Takes the faults that were met since the last call and did not end a call.
+    fn faults(&self) -> Vec<Error> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,16 @@
+//! clipscape
+pub mod error;
+pub mod grid;
+pub mod levels;
+pub mod progress;
+pub mod source;
+pub mod work;
+pub mod camera;
+pub mod pyramid;
+pub mod light;
+pub mod terrain;
+pub mod build;
+pub mod stream;
+pub mod clipmap;
+
+pub use error::{Error, ErrorKind, Result};

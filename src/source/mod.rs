@@ -1,0 +1,47 @@
+//! DEMs as their files give them: [`HeightSource`], one file per format, and procedural terrain.
+
+mod georeference;
+mod read_at;
+
+pub use georeference::{Georeference, Registration};
+pub use read_at::{Cursor, ReadAt};
+
+use crate::error::Result;
+use crate::grid::{Grid, Rect};
+
+/// What a DEM says of itself, and what was assumed of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    /// Size, spacing in metres, base.
+    pub grid: Grid,
+    /// The file format, as `info` prints it: `GeoTIFF`, `PNG`, `OpenEXR`, `SRTM`, `ESRI ASCII`, `synth`.
+    pub format: String,
+    /// The type of its samples as stored: `int16`, `float32`.
+    pub sample_type: String,
+    /// The step between neighbouring heights in metres, where samples are integers (scale applied).
+    pub step_m: Option<f64>,
+    /// Where it lies, if the file says.
+    pub place: Option<Georeference>,
+    /// The unit of heights as read: `metre`, or `unknown` (then taken as metres and listed in `assumed`).
+    pub vertical_unit: String,
+    /// Whole sentences on what was assumed because the file does not say.
+    pub assumed: Vec<String>,
+    /// The name by which messages speak of it: the path as given, or `synth:1024:1`.
+    pub name: String,
+}
+
+/// A DEM that can be read by rectangles of its samples.
+///
+/// Sequential readers may be slow where rectangles are not asked for from north to south.
+pub trait HeightSource: Send + Sync {
+    /// What it says of itself.
+    fn description(&self) -> &Description;
+
+    /// The heights of `rect` of level 0, row by row: metres less [`Grid::base_m`], NaN for no data.
+    ///
+    /// `rect` lies within the grid and `out` is `rect.area()` long.
+    ///
+    /// # Errors
+    /// Where the file is damaged, vanished, or uses what this crate does not read.
+    fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()>;
+}
