@@ -4,6 +4,12 @@
 //! -z), pitch turns up, roll tilts the camera's right side down. Depth is reversed and has no far end:
 //! near / distance along the view axis.
 
+mod flight;
+mod whole;
+
+pub use flight::{Flight, Key};
+pub use whole::overview;
+
 use glam::{DMat3, DVec3};
 
 use crate::error::{Error, ErrorKind, Result};
