@@ -12,5 +12,8 @@ pub mod terrain;
 pub mod build;
 pub mod stream;
 pub mod clipmap;
+pub mod stats;
+#[cfg(feature = "gpu")]
+pub mod render;
 
 pub use error::{Error, ErrorKind, Result};
