@@ -122,10 +122,6 @@ pub fn wgsl_constants() -> String {
     let vector = |v: Vec3| format!("vec3<f32>({:?}, {:?}, {:?})", v.x, v.y, v.z);
     line("LEVEL_SLOTS", format!("{LEVEL_SLOTS}u"));
     line("PATCH_CORNERS", format!("{}u", PATCH + 1));
-    line(
-        "VOID_HEIGHT",
-        format!("bitcast<f32>({:#x}u)", VOID_HEIGHT.to_bits()),
-    );
     line("VIEW_LIGHT", format!("{}u", ViewMode::Light.index()));
     line("VIEW_LEVEL", format!("{}u", ViewMode::Level.index()));
     for (name, value) in [

@@ -4,9 +4,13 @@
 //! -z), pitch turns up, roll tilts the camera's right side down. Depth is reversed and has no far end:
 //! near / distance along the view axis.
 
+mod flight;
 mod view;
+mod whole;
 
+pub use flight::{Flight, Key};
 pub use view::{MAX_PICTURE_PX, View};
+pub use whole::overview;
 
 use glam::{DMat3, DVec3};
 
