@@ -262,8 +262,8 @@ impl Scene<'_> {
     /// The least and greatest height of anything that may be drawn of a patch and all below it.
     fn subtree_heights(&self, patch: Patch) -> [f32; 2] {
         match self.info(patch) {
-            // A patch without a valid sample says nothing of its children, which may have some.
-            Some(info) if !info.bounds.is_void() => [info.bounds.need_min, info.bounds.need_max],
+            // NaN: neither the patch nor anything handed up to it has a valid sample; drop nothing on that word.
+            Some(info) if !info.bounds.need_min.is_nan() => [info.bounds.need_min, info.bounds.need_max],
             _ => [f32::NEG_INFINITY, f32::INFINITY],
         }
     }

@@ -6,8 +6,8 @@ use crate::camera::View;
 use crate::clipmap::{Clipmap, ClipmapOptions, UpdateReport};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu::{
-    ClipmapRenderer, DEPTH_FORMAT, DrawReport, Gpu, RendererOptions, SkyRenderer, UploadReport,
-    ViewTextures, read,
+    ClipmapRenderer, DEPTH_FORMAT, DrawReport, Gpu, RendererOptions, SkyRenderer, UploadReport, ViewTextures,
+    read,
 };
 use crate::levels::Levels;
 use crate::light::Sun;
@@ -133,12 +133,21 @@ impl Headless {
         let view = View::new(*camera, self.options.size_px)?;
         let update = *self.clipmap.update(levels, &view)?;
         let planned = Instant::now();
-        let upload = self.renderer.upload(&self.gpu.queue, &self.clipmap, &mut self.textures);
-        self.sky.upload(&self.gpu.queue, &view, &self.textures.shade_constants(&self.clipmap));
+        let upload = self
+            .renderer
+            .upload(&self.gpu.queue, &self.clipmap, &mut self.textures);
+        self.sky.upload(
+            &self.gpu.queue,
+            &view,
+            &self.textures.shade_constants(&self.clipmap),
+        );
         let uploaded = Instant::now();
-        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-            label: Some("clipscape frame"),
-        });
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                label: Some("clipscape frame"),
+            });
         let draw = self.record(&mut encoder);
         self.gpu.queue.submit([encoder.finish()]);
         self.wait()?;
@@ -204,9 +213,17 @@ impl Headless {
     }
 
     fn wait(&self) -> Result<()> {
-        self.gpu.device.poll(wgpu::PollType::wait_indefinitely()).map(drop).map_err(|e| {
-            Error::new(ErrorKind::Device, "graphics", format!("the device does not answer ({e})"))
-        })
+        self.gpu
+            .device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map(drop)
+            .map_err(|e| {
+                Error::new(
+                    ErrorKind::Device,
+                    "graphics",
+                    format!("the device does not answer ({e})"),
+                )
+            })
     }
 
     /// The depth of the last frame, row by row from the top left: near distance over distance along the view axis, 0
@@ -217,7 +234,8 @@ impl Headless {
     pub fn read_depth(&self) -> Result<Vec<f32>> {
         if self.options.sample_count != 1 {
             let what = format!("depth has {} samples a pixel", self.options.sample_count);
-            return Err(Error::new(ErrorKind::Misuse, "multisampling", what).advice("draw with 1 sample to read depth"));
+            return Err(Error::new(ErrorKind::Misuse, "multisampling", what)
+                .advice("draw with 1 sample to read depth"));
         }
         let bytes = self.gpu.read_texture(&self.targets.depth, 0)?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
@@ -265,11 +283,20 @@ impl Targets {
         let readable = wgpu::TextureUsages::COPY_SRC;
         let samples = options.sample_count;
         let colour = texture("clipscape colour", COLOUR_FORMAT, 1, readable);
-        let depth_usage = if samples == 1 { readable } else { wgpu::TextureUsages::empty() };
+        let depth_usage = if samples == 1 {
+            readable
+        } else {
+            wgpu::TextureUsages::empty()
+        };
         let depth = texture("clipscape depth", DEPTH_FORMAT, samples, depth_usage);
         let multisampled = (samples > 1).then(|| {
-            texture("clipscape multisampled colour", COLOUR_FORMAT, samples, wgpu::TextureUsages::empty())
-                .create_view(&Default::default())
+            texture(
+                "clipscape multisampled colour",
+                COLOUR_FORMAT,
+                samples,
+                wgpu::TextureUsages::empty(),
+            )
+            .create_view(&Default::default())
         });
         Self {
             colour_view: colour.create_view(&Default::default()),
@@ -298,7 +325,10 @@ impl Timer {
                 ty: wgpu::QueryType::Timestamp,
                 count: 2,
             }),
-            resolved: buffer("clipscape resolved timestamps", Usage::QUERY_RESOLVE | Usage::COPY_SRC),
+            resolved: buffer(
+                "clipscape resolved timestamps",
+                Usage::QUERY_RESOLVE | Usage::COPY_SRC,
+            ),
             mappable: buffer("clipscape mappable timestamps", Usage::COPY_DST | Usage::MAP_READ),
             period_ns: f64::from(gpu.queue.get_timestamp_period()),
         }
