@@ -1,7 +1,7 @@
 //! The terrain file: a pyramid with bounds and light as one multi-part OpenEXR file (`STEM.terrain.exr`).
 //!
 //! [`layout`] names the parts, their grids and the order of their tiles; [`Meta`] is what the header's
-//! `clipscape.` attributes say; [`write`] (over [`TerrainWriter`]) makes a file of any [`crate::levels::Levels`];
+//! `clipscape.` attributes say; [`write()`] (over [`TerrainWriter`]) makes a file of any [`crate::levels::Levels`];
 //! an open [`TerrainFile`] is one. Both are strict: a file that differs from the layout in any way is refused.
 
 mod cache;
