@@ -1,6 +1,6 @@
 //! One error type: its kind by who must act, the subject, what was found, advice, and the source.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
 /// A result whose error is this crate's [`Error`].
@@ -41,7 +41,13 @@ pub struct Error {
 impl Error {
     /// An error of `kind` about `subject` (a path, an option, a part of a file): `what` is wrong.
     pub fn new(kind: ErrorKind, subject: impl fmt::Display, what: impl fmt::Display) -> Self {
-        Self { kind, subject: subject.to_string(), what: what.to_string(), advice: String::new(), source: None }
+        Self {
+            kind,
+            subject: subject.to_string(),
+            what: what.to_string(),
+            advice: String::new(),
+            source: None,
+        }
     }
 
     /// The same error with a hint of what to do about it.
@@ -108,7 +114,7 @@ impl fmt::Display for Error {
             line.push_str(&self.advice);
         }
         for c in line.chars() {
-            if c.is_control() { f.write_str(" ")? } else { write!(f, "{c}")? }
+            f.write_char(if c.is_control() { ' ' } else { c })?;
         }
         Ok(())
     }
@@ -129,7 +135,10 @@ mod tests {
         let cause = std::io::Error::from(std::io::ErrorKind::NotFound);
         let error = Error::io("a\nb.tif", cause);
         assert_eq!(error.kind(), ErrorKind::Io);
-        assert_eq!(error.to_string(), "a b.tif: no such file or folder; check the path");
+        assert_eq!(
+            error.to_string(),
+            "a b.tif: no such file or folder; check the path"
+        );
         assert!(std::error::Error::source(&error).is_some());
     }
 }

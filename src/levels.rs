@@ -6,7 +6,10 @@ use half::f16;
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Rect};
 
-/// Bounds of one patch of a level, rounded outwards. All NaN where the patch is wholly void.
+/// Bounds of one patch of a level, rounded outwards.
+///
+/// `min`, `max` and `error` are NaN where the patch is wholly void. The saturated ones are NaN only where nothing was
+/// handed up to it either: a coarse sample may be void over ground that finer levels have.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Bounds {
@@ -26,7 +29,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The bounds of a patch without any valid sample.
+    /// The bounds of a patch without any valid sample, on its own level and below.
     pub const VOID: Self = Self {
         min: f32::NAN,
         max: f32::NAN,

@@ -1,19 +1,61 @@
-//! clipscape
+//! A terrain geometry clipmap engine.
+//!
+//! The way of the data, in the order of the rooms:
+//!
+//! 1. A DEM is *read* by rectangles: [`source::HeightSource`], one file per format.
+//! 2. It is *filtered* into ever coarser levels, and each patch of each level bounded: [`pyramid`].
+//! 3. Light is *traced* over the finest level and filtered likewise: [`light`].
+//! 4. All of it is *stored* in a terrain file: [`build`] drives, [`terrain`] writes and reads.
+//! 5. Any of these answers as [`levels::Levels`]; [`stream::Terrain`] opens whatever a user names.
+//! 6. Around the camera, each level's window is *made resident*: [`clipmap::Window`], moved by the rectangles of
+//!    [`clipmap::UpdatePlan`]; [`clipmap::Selection`] lists the patches to draw.
+//! 7. The GPU holds copies of the windows ([`gpu::ViewTextures`]). A vertex is *displaced* in
+//!    `shaders/shared/surface.wgsl`, whose twin is [`clipmap::displace`], and slid towards the next coarser level by
+//!    [`clipmap::alpha`].
+//! 8. A fragment is *shaded* in `shaders/terrain.wgsl` with the constants of [`shade`].
+//! 9. [`render`] makes headless frames of it: pictures, contact sheets, animations, statistics.
+//!
+//! Underneath all: [`grid`] is the only index arithmetic, [`error::Error`] the only error, [`camera`] says what is
+//! seen. Each room knows those above it in this file and none below.
+//!
+//! World coordinates are right-handed, in metres: x east, y up, z south; sample (0, 0) of a DEM lies at x = z = 0.
+
 pub mod error;
-pub mod grid;
-pub mod levels;
+
 pub mod progress;
-pub mod source;
+
 pub mod work;
+
+pub mod grid;
+
+pub mod levels;
+
 pub mod camera;
-pub mod pyramid;
-pub mod light;
-pub mod terrain;
-pub mod build;
-pub mod stream;
-pub mod clipmap;
+
 pub mod stats;
+
+pub mod source;
+
+pub mod pyramid;
+
+pub mod light;
+
+pub mod terrain;
+
+pub mod build;
+
+pub mod stream;
+
+pub mod clipmap;
+
+pub mod shade;
+
+#[cfg(feature = "gpu")]
+pub mod gpu;
+
 #[cfg(feature = "gpu")]
 pub mod render;
 
+pub use camera::{Camera, Flight, View};
+pub use clipmap::{Clipmap, ClipmapOptions};
 pub use error::{Error, ErrorKind, Result};

@@ -25,10 +25,14 @@ pub fn each_chunk<T: Send>(
     chunk_len: usize,
     task: impl Fn(usize, &mut [T]) + Sync,
 ) {
-    let chunks: Vec<std::sync::Mutex<&mut [T]>> =
-        data.chunks_mut(chunk_len.max(1)).map(std::sync::Mutex::new).collect();
+    let chunks: Vec<std::sync::Mutex<&mut [T]>> = data
+        .chunks_mut(chunk_len.max(1))
+        .map(std::sync::Mutex::new)
+        .collect();
     work.each(chunks.len(), &|index| {
-        let mut chunk = chunks[index].lock().expect("each chunk is locked once, by its own task");
+        let mut chunk = chunks[index]
+            .lock()
+            .expect("each chunk is locked once, by its own task");
         task(index, &mut chunk);
     });
 }

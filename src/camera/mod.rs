@@ -5,9 +5,11 @@
 //! near / distance along the view axis.
 
 mod flight;
+mod view;
 mod whole;
 
 pub use flight::{Flight, Key};
+pub use view::{MAX_PICTURE_PX, View};
 pub use whole::overview;
 
 use glam::{DMat3, DVec3};
@@ -39,18 +41,26 @@ impl Camera {
         if !self.eye.is_finite() {
             return misuse(format!("the eye at {} is not finite", self.eye));
         }
-        for (name, angle) in
-            [("heading", self.heading_deg), ("pitch", self.pitch_deg), ("roll", self.roll_deg)]
-        {
+        for (name, angle) in [
+            ("heading", self.heading_deg),
+            ("pitch", self.pitch_deg),
+            ("roll", self.roll_deg),
+        ] {
             if !angle.is_finite() {
                 return misuse(format!("a {name} of {angle} degrees is not finite"));
             }
         }
         if self.pitch_deg.abs() > 90.0 {
-            return misuse(format!("a pitch of {} degrees is outside -90 to 90", self.pitch_deg));
+            return misuse(format!(
+                "a pitch of {} degrees is outside -90 to 90",
+                self.pitch_deg
+            ));
         }
         if !(self.fov_deg > 0.0 && self.fov_deg < 180.0) {
-            return misuse(format!("a field of view of {} degrees is outside 0 to 180", self.fov_deg));
+            return misuse(format!(
+                "a field of view of {} degrees is outside 0 to 180",
+                self.fov_deg
+            ));
         }
         Ok(())
     }
@@ -75,7 +85,11 @@ impl Camera {
         if level == 0.0 && d.y == 0.0 {
             return (0.0, 0.0);
         }
-        let heading = if level == 0.0 { 0.0 } else { d.x.atan2(-d.z).to_degrees().rem_euclid(360.0) };
+        let heading = if level == 0.0 {
+            0.0
+        } else {
+            d.x.atan2(-d.z).to_degrees().rem_euclid(360.0)
+        };
         (heading, d.y.atan2(level).to_degrees())
     }
 }
@@ -97,7 +111,13 @@ mod tests {
     use super::*;
 
     fn camera(heading_deg: f64, pitch_deg: f64, roll_deg: f64) -> Camera {
-        Camera { eye: DVec3::ZERO, heading_deg, pitch_deg, roll_deg, fov_deg: 60.0 }
+        Camera {
+            eye: DVec3::ZERO,
+            heading_deg,
+            pitch_deg,
+            roll_deg,
+            fov_deg: 60.0,
+        }
     }
 
     #[test]
@@ -105,12 +125,23 @@ mod tests {
         let axes = camera(0.0, 0.0, 0.0).axes();
         assert_eq!(axes.col(2), DVec3::NEG_Z, "north is -z");
         assert_eq!(axes.col(0), DVec3::X, "facing north, right is east");
-        assert_eq!(camera(90.0, 0.0, 0.0).axes().col(2), DVec3::X, "heading 90 is east");
+        assert_eq!(
+            camera(90.0, 0.0, 0.0).axes().col(2),
+            DVec3::X,
+            "heading 90 is east"
+        );
         assert_eq!(camera(0.0, 90.0, 0.0).axes().col(2), DVec3::Y);
-        assert_eq!(camera(0.0, 0.0, 90.0).axes().col(0), DVec3::NEG_Y, "roll puts the right side down");
+        assert_eq!(
+            camera(0.0, 0.0, 90.0).axes().col(0),
+            DVec3::NEG_Y,
+            "roll puts the right side down"
+        );
         let axes = camera(33.0, -12.0, 71.0).axes();
         assert!((axes * axes.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-15));
-        assert!((axes.col(0).cross(axes.col(1)) + axes.col(2)).length() < 1e-15, "right x up is backward");
+        assert!(
+            (axes.col(0).cross(axes.col(1)) + axes.col(2)).length() < 1e-15,
+            "right x up is backward"
+        );
     }
 
     #[test]
@@ -118,7 +149,10 @@ mod tests {
         for (heading, pitch) in [(0.0, 0.0), (123.0, -45.0), (359.0, 89.0), (200.0, 10.0)] {
             let forward = camera(heading, pitch, 0.0).axes().col(2);
             let (h, p) = Camera::toward(DVec3::ONE, DVec3::ONE + forward * 7.0);
-            assert!((h - heading).abs() < 1e-9 && (p - pitch).abs() < 1e-9, "{heading} {pitch}: {h} {p}");
+            assert!(
+                (h - heading).abs() < 1e-9 && (p - pitch).abs() < 1e-9,
+                "{heading} {pitch}: {h} {p}"
+            );
         }
         assert_eq!(Camera::toward(DVec3::ZERO, DVec3::NEG_Y), (0.0, -90.0));
     }
@@ -128,10 +162,22 @@ mod tests {
         let good = camera(0.0, 0.0, 0.0);
         assert!(good.check().is_ok());
         for bad in [
-            Camera { eye: DVec3::new(f64::NAN, 0.0, 0.0), ..good },
-            Camera { heading_deg: f64::INFINITY, ..good },
-            Camera { pitch_deg: 91.0, ..good },
-            Camera { fov_deg: 180.0, ..good },
+            Camera {
+                eye: DVec3::new(f64::NAN, 0.0, 0.0),
+                ..good
+            },
+            Camera {
+                heading_deg: f64::INFINITY,
+                ..good
+            },
+            Camera {
+                pitch_deg: 91.0,
+                ..good
+            },
+            Camera {
+                fov_deg: 180.0,
+                ..good
+            },
             Camera { fov_deg: 0.0, ..good },
         ] {
             assert_eq!(bad.check().unwrap_err().kind(), ErrorKind::Misuse);

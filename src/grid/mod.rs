@@ -45,13 +45,19 @@ impl Size {
     /// The size of level `level` of a grid of this size: `ceil((W - 1) / 2^l) + 1`, likewise for rows.
     pub fn level(self, level: u32) -> Self {
         let halve = |n: i64| ((n - 1) + (1i64 << level) - 1) / (1i64 << level) + 1;
-        Self { width: halve(self.width), height: halve(self.height) }
+        Self {
+            width: halve(self.width),
+            height: halve(self.height),
+        }
     }
 
     /// The number of patches that cover a level of this size: at least 1 x 1.
     pub fn patches(self) -> Self {
         let count = |n: i64| ((n - 1) + PATCH - 1) / PATCH;
-        Self { width: count(self.width).max(1), height: count(self.height).max(1) }
+        Self {
+            width: count(self.width).max(1),
+            height: count(self.height).max(1),
+        }
     }
 }
 
@@ -72,7 +78,12 @@ pub struct Grid {
 impl Grid {
     /// A grid without offset and base.
     pub fn new(width: i64, height: i64, spacing_m: [f64; 2]) -> Self {
-        Self { size: Size { width, height }, spacing_m, offset: [0, 0], base_m: 0.0 }
+        Self {
+            size: Size { width, height },
+            spacing_m,
+            offset: [0, 0],
+            base_m: 0.0,
+        }
     }
 
     /// The size of level `level` in samples.
@@ -108,7 +119,9 @@ impl Grid {
             return Err(format!("a size of {width} x {height} samples holds no data"));
         }
         if width > MAX_SIZE || height > MAX_SIZE {
-            return Err(format!("a size of {width} x {height} samples is above {MAX_SIZE} a side"));
+            return Err(format!(
+                "a size of {width} x {height} samples is above {MAX_SIZE} a side"
+            ));
         }
         if !self.spacing_m.iter().all(|s| s.is_finite() && *s > 0.0) {
             let [dx, dz] = self.spacing_m;
@@ -131,7 +144,10 @@ mod tests {
             let grid = Grid::new(n, n, [1.0, 1.0]);
             for l in 0..grid.file_levels() {
                 let last = (grid.level(l).width - 1) << l;
-                assert!(last >= n - 1 && last - (n - 1) < 1 << l, "{n} samples, level {l}: last at {last}");
+                assert!(
+                    last >= n - 1 && last - (n - 1) < 1 << l,
+                    "{n} samples, level {l}: last at {last}"
+                );
             }
         }
     }

@@ -55,7 +55,8 @@ impl Rect {
         }
         let low = |first: i64| (first - 1).div_euclid(PATCH); // a shared side belongs to both
         let high = |end: i64| (end - 1).div_euclid(PATCH) + 1;
-        Rect::new(low(self.x0), low(self.z0), high(self.x1), high(self.z1)).intersection(size.patches().rect())
+        Rect::new(low(self.x0), low(self.z0), high(self.x1), high(self.z1))
+            .intersection(size.patches().rect())
     }
 }
 
@@ -65,7 +66,10 @@ mod tests {
 
     #[test]
     fn touching_patches_are_those_that_share_a_sample() {
-        let size = Size { width: 41, height: 30 };
+        let size = Size {
+            width: 41,
+            height: 30,
+        };
         let patches = size.patches();
         for x0 in 0..41 {
             for x1 in x0 + 1..42 {
@@ -73,7 +77,10 @@ mod tests {
                 let touching = rect.touching_patches(size);
                 for a in 0..patches.width {
                     for b in 0..patches.height {
-                        let shares = !Patch::new(0, a, b).samples_within(size).intersection(rect).is_empty();
+                        let shares = !Patch::new(0, a, b)
+                            .samples_within(size)
+                            .intersection(rect)
+                            .is_empty();
                         assert_eq!(touching.contains(a, b), shares, "{rect:?} against ({a}, {b})");
                     }
                 }

@@ -15,7 +15,12 @@ pub struct Rect {
 
 impl Rect {
     /// The empty rectangle.
-    pub const EMPTY: Self = Self { x0: 0, z0: 0, x1: 0, z1: 0 };
+    pub const EMPTY: Self = Self {
+        x0: 0,
+        z0: 0,
+        x1: 0,
+        z1: 0,
+    };
 
     /// Columns `x0..x1` and rows `z0..z1`.
     pub const fn new(x0: i64, z0: i64, x1: i64, z1: i64) -> Self {

@@ -10,7 +10,10 @@ pub fn slot(i: i64, n: i64) -> i64 {
 /// Splits `rect` (at most `n` cells a side) at the seam of an `n` x `n` torus: each piece is contiguous in
 /// slots. `shift` is added to an index before its slot is taken.
 pub fn seam_pieces(rect: Rect, n: i64, shift: [i64; 2]) -> impl Iterator<Item = Rect> {
-    debug_assert!(rect.width() <= n && rect.height() <= n, "{rect:?} does not fit a torus of {n}");
+    debug_assert!(
+        rect.width() <= n && rect.height() <= n,
+        "{rect:?} does not fit a torus of {n}"
+    );
     let seam = |first: i64, end: i64, shift: i64| (first + (n - slot(first + shift, n))).clamp(first, end);
     let x = seam(rect.x0, rect.x1, shift[0]);
     let z = seam(rect.z0, rect.z1, shift[1]);

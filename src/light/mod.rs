@@ -1,1 +1,138 @@
-//! light
+//! Light on the terrain: the sun's share and the sky's share of every sample, traced over the DEM's surface.
+//!
+//! `horizon` finds how high the terrain stands in a direction, `sun` and `sky` make light of it, `fill`
+//! spreads it under voids, and [`light_levels`] filters it into levels like the heights. All of it is traced
+//! over `S0`, level 0; no data, and what lies beyond the DEM, neither casts a shadow nor blocks the sky.
+//!
+//! Azimuths are degrees clockwise from true north, which is taken to be grid north. Heights are metres less
+//! [`Grid::base_m`], row by row, finite or NaN for no data.
+
+use half::f16;
+
+use crate::error::{Error, ErrorKind, Result};
+use crate::grid::{Grid, Size};
+use crate::levels::LightSample;
+use crate::progress::Progress;
+use crate::pyramid::{Filter, downsample};
+use crate::work::Work;
+
+mod fill;
+mod horizon;
+mod normal;
+mod sky;
+mod sun;
+
+pub use fill::fill_voids;
+pub use horizon::horizon_tangents;
+pub use sky::sky_share;
+pub use sun::{DISC_DEG, Sun, disc_share, sun_share};
+
+/// Sky directions unless others are asked for.
+pub const DEFAULT_SKY_DIRECTIONS: u32 = 16;
+
+/// Rows in a band: the unit of work.
+const BAND: usize = 16;
+
+/// What light is traced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightOptions {
+    /// Where the sun stands.
+    pub sun: Sun,
+    /// Azimuths in which the horizon is sought for the sky's share; 0 leaves the terrain out of it.
+    pub sky_directions: u32,
+}
+
+impl Default for LightOptions {
+    fn default() -> Self {
+        Self {
+            sun: Sun::default(),
+            sky_directions: DEFAULT_SKY_DIRECTIONS,
+        }
+    }
+}
+
+fn misuse(what: impl std::fmt::Display) -> Error {
+    Error::new(ErrorKind::Misuse, "light", what)
+}
+
+/// Refuses an impossible grid and samples that are not as many as it says.
+fn check(grid: &Grid, samples: usize) -> Result<()> {
+    grid.check().map_err(misuse)?;
+    if samples as i64 == grid.size.samples() {
+        return Ok(());
+    }
+    let Size { width, height } = grid.size;
+    Err(misuse(format!("{samples} samples given for {width} x {height}")))
+}
+
+/// Traces the light of level 0 and filters it into all of [`Grid::file_levels`].
+///
+/// # Errors
+/// [`ErrorKind::Misuse`] where the grid or the sun is impossible or `heights` has another length;
+/// [`ErrorKind::Cancelled`].
+pub fn trace_light(
+    grid: &Grid,
+    heights: &[f32],
+    options: &LightOptions,
+    filter: &Filter,
+    work: &dyn Work,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<LightSample>>> {
+    let sun = sun_share(heights, grid, options.sun, work, progress)?;
+    let sky = sky_share(heights, grid, options.sky_directions, work, progress)?;
+    light_levels(grid, heights, sun, sky, filter, work, progress)
+}
+
+/// The light of all of [`Grid::file_levels`] from that of level 0: under voids it is filled outward from valid
+/// neighbours, then filtered like heights in f32 and clamped to 0 to 1 on each level; only what is returned
+/// is rounded to f16.
+///
+/// # Errors
+/// [`ErrorKind::Misuse`] where the grid is impossible or a length is not the grid's; [`ErrorKind::Cancelled`].
+pub fn light_levels(
+    grid: &Grid,
+    heights: &[f32],
+    sun: Vec<f32>,
+    sky: Vec<f32>,
+    filter: &Filter,
+    work: &dyn Work,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<LightSample>>> {
+    for samples in [heights.len(), sun.len(), sky.len()] {
+        check(grid, samples)?;
+    }
+    let count = grid.file_levels();
+    progress.begin(
+        "light levels",
+        (1..count).map(|l| 2 * grid.level(l).samples() as u64).sum(),
+    );
+    let filled = |mut share: Vec<f32>| {
+        share
+            .iter_mut()
+            .zip(heights)
+            .filter(|(_, h)| h.is_nan())
+            .for_each(|(s, _)| *s = f32::NAN);
+        fill_voids(&mut share, grid.size);
+        share.iter_mut().for_each(|s| *s = s.clamp(0.0, 1.0));
+        share
+    };
+    let (mut sun, mut sky) = (filled(sun), filled(sky));
+    let mut levels = Vec::with_capacity(count as usize);
+    for l in 0..count {
+        if l > 0 {
+            for share in [&mut sun, &mut sky] {
+                *share = downsample(share, grid.level(l - 1), filter, None, work, progress)?;
+                share.iter_mut().for_each(|s| *s = s.clamp(0.0, 1.0));
+            }
+        }
+        let sample = |(&sun, &sky)| LightSample {
+            sun: f16::from_f32(sun),
+            sky: f16::from_f32(sky),
+        };
+        levels.push(sun.iter().zip(&sky).map(sample).collect());
+    }
+    Ok(levels)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,3 +1,6 @@
-//! Headless frames and what is made of them: pictures, a contact sheet, an animation.
+//! Headless frames, and the files they become.
 
+mod headless;
 pub mod pictures;
+
+pub use headless::{COLOUR_FORMAT, Frame, Headless, HeadlessOptions};

@@ -29,6 +29,9 @@ pub struct Georeference {
 impl Georeference {
     /// The CRS coordinates of a point at (`column`, `row`), in samples of level 0.
     pub fn place(&self, column: f64, row: f64) -> [f64; 2] {
-        [self.origin[0] + column * self.pixel[0], self.origin[1] + row * self.pixel[1]]
+        [
+            self.origin[0] + column * self.pixel[0],
+            self.origin[1] + row * self.pixel[1],
+        ]
     }
 }

@@ -1,0 +1,59 @@
+// The look: ground colour, light, air and sky. The twin is `src/shade.rs`, which also emits the constants in capitals.
+
+struct ShadeConstants {
+    to_sun: vec4<f32>,          // unit vector east, up, south; w unused
+    low_m: f32,                 // heights above the DEM's base between which the ground's tint runs
+    high_m: f32,
+    base_m: f32,                // height of the DEM's base above sea level
+    slope_scale: f32,           // factor on slopes where light follows from them
+}
+
+@group(0) @binding(4) var<uniform> shade: ShadeConstants;
+
+// The colour of the ground by its height (0 at the lowest, 1 at the highest), its height above the sea, and the up
+// component of its normal.
+fn ground_colour(rise: f32, height_m: f32, up: f32) -> vec3<f32> {
+    let green = mix(GROUND_LOW, GROUND_MIDDLE, smoothstep(0.0, 0.45, rise));
+    let meadow = mix(green, GROUND_HIGH, smoothstep(0.35, 0.9, rise));
+    let steep = 1.0 - smoothstep(ROCK_UP, MEADOW_UP, up);
+    let rock = mix(meadow, GROUND_ROCK, steep);
+    let snow = smoothstep(SNOW_LOW_M, SNOW_HIGH_M, height_m) * smoothstep(ROCK_UP, MEADOW_UP, up);
+    return mix(rock, GROUND_SNOW, snow);
+}
+
+// Light on the ground from its shares of the sun and of the sky.
+fn illumination(sun: f32, sky: f32) -> vec3<f32> {
+    return SUN_LIGHT * sun + SKY_LIGHT * sky;
+}
+
+// Share of the light that reaches the eye through the air, by wavelength: density falls with height by HAZE_SCALE_M.
+// `from_m` and `to_m` are the heights of the ends above the lowest ground.
+fn transmission(distance_m: f32, from_m: f32, to_m: f32) -> vec3<f32> {
+    let a = max(from_m, 0.0) / HAZE_SCALE_M;
+    let b = max(to_m, 0.0) / HAZE_SCALE_M;
+    let difference = b - a;
+    let sloping = (exp(-a) - exp(-b)) / select(difference, 1.0, abs(difference) < 1e-3);
+    let density = select(sloping, exp(-0.5 * (a + b)), abs(difference) < 1e-3);
+    return exp(-HAZE_PER_M * (density * distance_m));
+}
+
+// The sky in a direction (unit vector): horizon to zenith, brighter around the sun.
+fn sky_colour(direction: vec3<f32>) -> vec3<f32> {
+    let height = clamp(direction.y, 0.0, 1.0);
+    let clear = mix(SKY_HORIZON, SKY_ZENITH, sqrt(height));
+    let below = mix(clear, SKY_BELOW, smoothstep(0.0, 0.5, -direction.y));
+    let toward_sun = max(dot(direction, shade.to_sun.xyz), 0.0);
+    let glow = toward_sun * toward_sun * toward_sun * toward_sun;
+    return below + SUN_GLOW * (glow * glow * (1.0 - smoothstep(0.0, 0.3, -direction.y)));
+}
+
+// From radiance to what a display shows, before its own encoding.
+fn tone(radiance: vec3<f32>) -> vec3<f32> {
+    return 1.0 - exp(-EXPOSURE * radiance);
+}
+
+// For targets that do not encode sRGB themselves.
+fn encode(linear: vec3<f32>) -> vec3<f32> {
+    let curve = 1.055 * pow(max(linear, vec3(0.0031308)), vec3(1.0 / 2.4)) - 0.055;
+    return select(linear, select(curve, linear * 12.92, linear <= vec3(0.0031308)), ENCODE_SRGB);
+}

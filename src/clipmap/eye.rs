@@ -1,0 +1,90 @@
+//! The eye as the clipmap knows it: an integer sample and a fraction, so that nothing on the GPU is absolute.
+
+use crate::camera::Camera;
+use crate::grid::Grid;
+
+/// An eye farther than this many samples from the DEM is anchored there; its fraction then grows beyond 1.
+const FAR_SAMPLES: i64 = 1 << 23;
+
+/// The eye in samples of level 0 and metres above the DEM's base.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eye {
+    /// The sample of level 0 to whose south-east the eye lies, in the DEM's own indices.
+    pub anchor: [i64; 2],
+    /// What remains, in samples: 0 to 1, unless the eye is very far from the DEM.
+    pub fraction: [f64; 2],
+    /// Height in metres above the DEM's base, before vertical scale.
+    pub height_m: f64,
+}
+
+impl Eye {
+    /// The eye of `camera` over `grid`.
+    pub fn new(camera: &Camera, grid: &Grid) -> Self {
+        let axis = |metres: f64, spacing_m: f64, samples: i64| {
+            let at = metres / spacing_m;
+            // `as` saturates, so any finite position ends up on the right side.
+            let anchor = (at.floor() as i64).clamp(-FAR_SAMPLES, samples - 1 + FAR_SAMPLES);
+            (anchor, at - anchor as f64)
+        };
+        let x = axis(camera.eye.x, grid.spacing_m[0], grid.size.width);
+        let z = axis(camera.eye.z, grid.spacing_m[1], grid.size.height);
+        Self {
+            anchor: [x.0, z.0],
+            fraction: [x.1, z.1],
+            height_m: camera.eye.y - grid.base_m,
+        }
+    }
+
+    /// The eye's position in samples of level 0, east and south of sample (0, 0).
+    pub fn samples(&self) -> [f64; 2] {
+        [
+            self.anchor[0] as f64 + self.fraction[0],
+            self.anchor[1] as f64 + self.fraction[1],
+        ]
+    }
+
+    /// The height as the sum of two f32, so that heights near it subtract without loss.
+    pub fn height_high_low(&self) -> [f32; 2] {
+        let high = self.height_m as f32;
+        [high, (self.height_m - f64::from(high)) as f32]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    fn eye(x: f64, z: f64) -> Eye {
+        let camera = Camera {
+            eye: DVec3::new(x, 7.5, z),
+            heading_deg: 0.0,
+            pitch_deg: 0.0,
+            roll_deg: 0.0,
+            fov_deg: 60.0,
+        };
+        Eye::new(&camera, &Grid::new(100, 50, [2.0, 4.0]))
+    }
+
+    #[test]
+    fn anchor_and_fraction_make_up_the_position() {
+        let e = eye(-3.0, 9.0);
+        assert_eq!((e.anchor, e.fraction), ([-2, 2], [0.5, 0.25]));
+        assert_eq!(e.samples(), [-1.5, 2.25]);
+    }
+
+    #[test]
+    fn a_far_eye_is_anchored_within_reach_of_i32() {
+        let e = eye(1e30, -1e30);
+        assert_eq!(e.anchor, [99 + FAR_SAMPLES, -FAR_SAMPLES]);
+        assert!(e.fraction[0] > 1e29 && e.fraction[1] < -1e29);
+    }
+
+    #[test]
+    fn heights_split_without_loss_of_what_f32_can_show() {
+        let mut e = eye(0.0, 0.0);
+        e.height_m = 1e7 + 0.123_456_789;
+        let [high, low] = e.height_high_low();
+        assert!((f64::from(high) + f64::from(low) - e.height_m).abs() < 1e-8);
+    }
+}

@@ -1,0 +1,127 @@
+//! `UpdatePlan`: for each level the rectangles that cover exactly what a move of its window exposes.
+
+use super::constants::Ring;
+use super::eye::Eye;
+use super::window::{LightTexel, Window};
+use crate::grid::Rect;
+
+/// What one level's window gains in an update.
+#[derive(Clone, Debug)]
+pub struct LevelPlan {
+    /// The level.
+    pub level: u32,
+    /// The resident samples before.
+    pub from: Rect,
+    /// The resident samples after.
+    pub to: Rect,
+    /// Disjoint rectangles of samples, split at the texture's seam, that are in `to` and not in `from`.
+    pub heights: Vec<Rect>,
+    /// Disjoint rectangles of light texels, split at their texture's seam, over the same ground.
+    pub light: Vec<Rect>,
+}
+
+/// What all windows gain in an update, coarse levels first.
+#[derive(Clone, Debug, Default)]
+pub struct UpdatePlan {
+    levels: Vec<LevelPlan>,
+}
+
+impl UpdatePlan {
+    /// An empty plan for `levels` levels, whose memory later plans use again.
+    pub fn new(levels: u32) -> Self {
+        let level = |level| LevelPlan {
+            level,
+            from: Rect::EMPTY,
+            to: Rect::EMPTY,
+            heights: Vec::with_capacity(16),
+            light: Vec::with_capacity(16),
+        };
+        Self {
+            levels: (0..levels).rev().map(level).collect(),
+        }
+    }
+
+    /// Plans the move of `windows` (by level, finest first) to where they belong for `eye`.
+    pub fn plan(&mut self, windows: &[Window], eye: &Eye) {
+        for plan in &mut self.levels {
+            let window = &windows[plan.level as usize];
+            plan.from = window.resident();
+            plan.to = window.target(eye);
+            plan.heights.clear();
+            plan.light.clear();
+            for exposed in plan.to.difference(plan.from) {
+                plan.heights.extend(window.pieces(exposed));
+            }
+            for exposed in window.light_of(plan.to).difference(window.light_resident()) {
+                plan.light.extend(window.light_pieces(exposed));
+            }
+        }
+    }
+
+    /// The levels' plans, coarse levels first.
+    pub fn levels(&self) -> &[LevelPlan] {
+        &self.levels
+    }
+
+    /// The rectangles that are written.
+    pub fn uploads(&self) -> usize {
+        self.levels.iter().map(|l| l.heights.len() + l.light.len()).sum()
+    }
+
+    /// The bytes that are written: 4 a height, 8 a light texel.
+    pub fn bytes(&self) -> u64 {
+        let area = |rects: &[Rect]| rects.iter().map(|r| r.area()).sum::<i64>() as u64;
+        self.levels
+            .iter()
+            .map(|l| area(&l.heights) * HEIGHT_BYTES + area(&l.light) * LIGHT_BYTES)
+            .sum()
+    }
+}
+
+/// Bytes of a height texel.
+pub const HEIGHT_BYTES: u64 = size_of::<f32>() as u64;
+
+/// Bytes of a light texel.
+pub const LIGHT_BYTES: u64 = size_of::<LightTexel>() as u64;
+
+/// The bytes that a move of a level's window from `from` to `to` exposes, computed from the two windows alone: what
+/// an update must write at least. `light_level_size` is the size of the level whose light it holds.
+pub fn exposed_bytes(level: u32, from: Rect, to: Rect, light_level_size: crate::grid::Size) -> u64 {
+    let fresh = |from: Rect, to: Rect| (to.area() - to.intersection(from).area()) as u64;
+    let scale = if level == 0 { 1 } else { 2 };
+    let light = |r: Rect| {
+        let end = |end: i64, size: i64| (end * scale).min(size);
+        Rect::new(
+            r.x0 * scale,
+            r.z0 * scale,
+            end(r.x1, light_level_size.width),
+            end(r.z1, light_level_size.height),
+        )
+    };
+    let light_from = if from.is_empty() { Rect::EMPTY } else { light(from) };
+    fresh(from, to) * HEIGHT_BYTES + fresh(light_from, light(to)) * LIGHT_BYTES
+}
+
+/// Whether a ring's windows can hold levels of a DEM at all: a power of two in range, a transition within its limit.
+///
+/// # Errors
+/// [`crate::ErrorKind::Misuse`], naming the value and what is allowed.
+pub(super) fn check(ring: &Ring) -> crate::Result<()> {
+    let misuse = |subject: &str, what: String, advice: String| {
+        Err(crate::Error::new(crate::ErrorKind::Misuse, subject, what).advice(advice))
+    };
+    let n = ring.clip_size;
+    if !(64..=2048).contains(&n) || n & (n - 1) != 0 {
+        return misuse(
+            "clip size",
+            format!("{n} samples"),
+            "use 64, 128, 256, 512, 1024 or 2048".to_string(),
+        );
+    }
+    let limit = Ring::transition_limit(n);
+    if !(0..=limit).contains(&ring.transition) {
+        let advice = format!("a clip size of {n} allows 0 to {limit}");
+        return misuse("transition", format!("{} steps", ring.transition), advice);
+    }
+    Ok(())
+}

@@ -1,0 +1,74 @@
+//! Light texels: light as it was traced, beside the slopes of the heights, at one level's resolution.
+
+use half::f16;
+
+use super::window::{LightTexel, Scratch, arrived};
+use crate::error::Result;
+use crate::grid::Rect;
+use crate::levels::{Levels, LightSample};
+
+/// Reads `rect` of level `level` into `scratch.texels`.
+pub(super) fn read(source: &dyn Levels, level: u32, rect: Rect, scratch: &mut Scratch) -> Result<()> {
+    let grid = source.grid();
+    let around = rect.grown(1).intersection(grid.level(level).rect());
+    scratch.relief.resize(around.area() as usize, 0.0);
+    arrived(source.heights(level, around, &mut scratch.relief)?)?;
+    scratch
+        .shares
+        .resize(rect.area() as usize, LightSample::default());
+    if source.has_light() {
+        arrived(source.light(level, rect, &mut scratch.shares)?)?;
+    }
+    let step = (1i64 << level) as f64;
+    let spacing_m = grid.spacing_m.map(|s| (s * step) as f32);
+    let heights = &scratch.relief;
+    let at = |i: i64, j: i64| {
+        if around.contains(i, j) {
+            heights[((j - around.z0) * around.width() + (i - around.x0)) as usize]
+        } else {
+            f32::NAN
+        }
+    };
+    scratch.texels.clear();
+    scratch.texels.extend(
+        rect.cells()
+            .zip(&scratch.shares)
+            .map(|((i, j), share)| -> LightTexel {
+                let h = at(i, j);
+                let east = slope(at(i - 1, j), h, at(i + 1, j), spacing_m[0]);
+                let south = slope(at(i, j - 1), h, at(i, j + 1), spacing_m[1]);
+                [share.sun, share.sky, east, south]
+            }),
+    );
+    Ok(())
+}
+
+/// The slope at `here` (rise over run, no unit) from its neighbours: central where both are there, one-sided where
+/// one is, 0 where none is or where there is no height at all.
+fn slope(before: f32, here: f32, after: f32, spacing_m: f32) -> f16 {
+    let (rise, steps) = match (before.is_nan(), here.is_nan(), after.is_nan()) {
+        (false, false, false) => (after - before, 2.0),
+        (true, false, false) => (after - here, 1.0),
+        (false, false, true) => (here - before, 1.0),
+        _ => (0.0, 1.0),
+    };
+    // Halves hold up to 65504; a cliff that is steeper than that is as steep.
+    f16::from_f32((rise / (spacing_m * steps)).clamp(-6e4, 6e4))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_are_central_one_sided_or_flat() {
+        let nan = f32::NAN;
+        let of = |b, h, a| slope(b, h, a, 10.0).to_f32();
+        assert_eq!(of(0.0, 7.0, 40.0), 2.0);
+        assert_eq!(of(nan, 0.0, 10.0), 1.0);
+        assert_eq!(of(0.0, 10.0, nan), 1.0);
+        assert_eq!(of(nan, 10.0, nan), 0.0);
+        assert_eq!(of(0.0, nan, 10.0), 0.0);
+        assert!(of(-1e30, 0.0, 1e30).is_finite());
+    }
+}

@@ -1,0 +1,339 @@
+//! Selection: one recursive walk from the coarsest level down to the patches that a frame draws.
+
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+use super::alpha::MARGIN;
+use super::constants::{LevelConstants, Ring};
+use super::eye::Eye;
+use super::frustum::Frustum;
+use super::held::HeldField;
+use super::window::{PatchInfo, Window};
+use crate::grid::{Grid, PATCH, Patch, Rect};
+
+/// A patch to draw, as the GPU reads it.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Instance {
+    /// Its first column and row, in samples of its level.
+    pub origin: [i32; 2],
+    /// Its level.
+    pub level: u32,
+    /// The height in metres above the DEM's base at which void vertices are put: within the patch's bounds, so that
+    /// the triangles of a hole, which are discarded, stay where the patch is.
+    pub fill: f32,
+}
+
+/// A side of a patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Towards -x.
+    West,
+    /// Towards +x.
+    East,
+    /// Towards -z.
+    North,
+    /// Towards +z.
+    South,
+}
+
+impl Side {
+    /// All four, in the order of [`Selection::closers`].
+    pub const ALL: [Self; 4] = [Self::West, Self::East, Self::North, Self::South];
+
+    fn beyond(self, patch: Patch) -> Patch {
+        let (da, db) = match self {
+            Self::West => (-1, 0),
+            Self::East => (1, 0),
+            Self::North => (0, -1),
+            Self::South => (0, 1),
+        };
+        Patch::new(patch.level, patch.a + da, patch.b + db)
+    }
+}
+
+/// Triangles of a patch: 8 x 8 quads.
+pub const PATCH_TRIANGLES: u64 = 2 * (PATCH * PATCH) as u64;
+
+/// Zero-area triangles that close a side which borders a coarser patch.
+pub const CLOSER_TRIANGLES: u64 = PATCH as u64 / 2;
+
+/// The patches of a frame, near ones first.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// Patches without voids, wholly within the DEM.
+    pub whole: Vec<Instance>,
+    /// Patches that may have voids or reach over the DEM's edge: their fragments may have to be discarded.
+    pub ragged: Vec<Instance>,
+    /// For each [`Side`], the patches that border a coarser one there.
+    pub closers: [Vec<Instance>; 4],
+    /// Subtrees of the walk that were dropped because they are not seen.
+    pub culled: u64,
+    /// A bit for each level that is drawn.
+    pub levels: u32,
+    columns: Vec<i64>,
+    rows: Vec<i64>,
+}
+
+impl Selection {
+    /// The patches drawn.
+    pub fn patches(&self) -> u64 {
+        (self.whole.len() + self.ragged.len()) as u64
+    }
+
+    /// The triangles drawn, closing ones included.
+    pub fn triangles(&self) -> u64 {
+        let closers: usize = self.closers.iter().map(Vec::len).sum();
+        self.patches() * PATCH_TRIANGLES + closers as u64 * CLOSER_TRIANGLES
+    }
+
+    /// All patches drawn.
+    pub fn instances(&self) -> impl Iterator<Item = &Instance> {
+        self.whole.iter().chain(&self.ragged)
+    }
+
+    /// Selects anew.
+    pub fn select(&mut self, scene: &Scene<'_>) {
+        self.whole.clear();
+        self.ragged.clear();
+        self.closers.iter_mut().for_each(Vec::clear);
+        self.culled = 0;
+        self.levels = 0;
+        let coarsest = scene.windows.len() as u32 - 1;
+        let roots = scene.roots();
+        let [x, z] = scene.eye_in_patches(coarsest);
+        let (mut columns, mut rows) = (std::mem::take(&mut self.columns), std::mem::take(&mut self.rows));
+        near_to_far(&mut columns, roots.x0, roots.x1, x);
+        near_to_far(&mut rows, roots.z0, roots.z1, z);
+        for &b in &rows {
+            for &a in &columns {
+                self.walk(scene, Patch::new(coarsest, a, b));
+            }
+        }
+        (self.columns, self.rows) = (columns, rows);
+    }
+
+    fn walk(&mut self, scene: &Scene<'_>, patch: Patch) {
+        if !scene.exists(patch) {
+            return;
+        }
+        if !scene.refined(patch) {
+            self.draw(scene, patch);
+            return;
+        }
+        if scene.unseen(patch, scene.subtree_heights(patch)) {
+            self.culled += 1;
+            return;
+        }
+        let [x, z] = scene.eye_in_patches(patch.level);
+        let east_first = usize::from(x > patch.a as f64 + 0.5);
+        let south_first = usize::from(z > patch.b as f64 + 0.5);
+        let children = patch.children();
+        for k in [0, 1, 2, 3] {
+            self.walk(scene, children[k ^ east_first ^ (south_first << 1)]);
+        }
+    }
+
+    fn draw(&mut self, scene: &Scene<'_>, patch: Patch) {
+        let own = scene.info(patch);
+        let parent = scene
+            .has_coarser(patch.level)
+            .then(|| scene.info(patch.parent()))
+            .flatten();
+        let heights = hull([own, parent]);
+        if heights[0].is_nan() {
+            return; // wholly void on both levels: nothing is there
+        }
+        if scene.unseen(patch, heights) {
+            self.culled += 1;
+            return;
+        }
+        let voids = [own, parent].into_iter().flatten().any(|p| p.voids);
+        let instance = Instance {
+            origin: [(patch.a * PATCH) as i32, (patch.b * PATCH) as i32],
+            level: patch.level,
+            fill: heights[0],
+        };
+        self.levels |= 1 << patch.level;
+        if voids || scene.over_the_edge(patch) {
+            &mut self.ragged
+        } else {
+            &mut self.whole
+        }
+        .push(instance);
+        for (side, closers) in Side::ALL.into_iter().zip(&mut self.closers) {
+            if scene.borders_coarser(patch, side.beyond(patch)) {
+                closers.push(instance);
+            }
+        }
+    }
+}
+
+/// What the walk looks at.
+pub struct Scene<'a> {
+    /// Where the samples lie.
+    pub grid: &'a Grid,
+    /// Clip size and transition.
+    pub ring: &'a Ring,
+    /// The eye.
+    pub eye: &'a Eye,
+    /// A window per level, finest first.
+    pub windows: &'a [Window],
+    /// The levels' constants, finest first.
+    pub levels: &'a [LevelConstants],
+    /// What holds levels back.
+    pub held: &'a HeldField,
+    /// What is seen; none to select without culling.
+    pub frustum: Option<&'a Frustum>,
+    /// Factor on heights relative to the eye.
+    pub vertical_scale: f64,
+}
+
+impl Scene<'_> {
+    /// The patches of the coarsest level: all of them, or those wholly in its window where finer levels are all that
+    /// was asked for.
+    fn roots(&self) -> Rect {
+        let window = &self.windows[self.windows.len() - 1];
+        let level = self.grid.level(window.level());
+        let resident = window.resident();
+        if resident == level.rect() {
+            return level.patches().rect();
+        }
+        let inner =
+            |first: i64, end: i64| ((first + PATCH - 1).div_euclid(PATCH), (end - 1).div_euclid(PATCH));
+        let (x0, mut x1) = inner(resident.x0, resident.x1);
+        let (z0, mut z1) = inner(resident.z0, resident.z1);
+        // The last patch ends where the level does, which need not be a whole patch on.
+        if resident.x1 == level.width {
+            x1 = level.patches().width;
+        }
+        if resident.z1 == level.height {
+            z1 = level.patches().height;
+        }
+        Rect::new(x0, z0, x1, z1)
+    }
+
+    fn has_coarser(&self, level: u32) -> bool {
+        level as usize + 1 < self.windows.len()
+    }
+
+    fn exists(&self, patch: Patch) -> bool {
+        self.grid.patches(patch.level).rect().contains(patch.a, patch.b)
+    }
+
+    fn info(&self, patch: Patch) -> Option<&PatchInfo> {
+        self.windows[patch.level as usize].patch(patch.a, patch.b)
+    }
+
+    fn eye_in_patches(&self, level: u32) -> [f64; 2] {
+        self.eye.samples().map(|s| s / (PATCH << level) as f64)
+    }
+
+    /// Whether the patch's four children are drawn instead of it: unless alpha of their level is 1 on all of it.
+    /// A function of the view and the held field alone, not of what was culled or walked.
+    pub fn refined(&self, patch: Patch) -> bool {
+        if patch.level == 0 {
+            return false;
+        }
+        let finer = patch.level - 1;
+        let side = PATCH << patch.level;
+        // Taken from the integer anchor first: exact, however far from the DEM's corner.
+        let distance = |index: i64, axis: usize| {
+            let first = (index * side - self.eye.anchor[axis]) as f64 - self.eye.fraction[axis];
+            first.max(-(first + side as f64)).max(0.0)
+        };
+        let ground = distance(patch.a, 0).max(distance(patch.b, 1)) / (1i64 << finer) as f64;
+        let d = ground.max(f64::from(self.levels[finer as usize].climb));
+        d < self.ring.reach() as f64 + MARGIN && self.held.least(finer, patch.a, patch.b) < 1.0
+    }
+
+    fn borders_coarser(&self, patch: Patch, neighbour: Patch) -> bool {
+        self.has_coarser(patch.level)
+            && neighbour.parent() != patch.parent()
+            && self.exists(neighbour)
+            && !self.refined(neighbour.parent())
+    }
+
+    fn over_the_edge(&self, patch: Patch) -> bool {
+        let end = |index: i64| ((index + 1) * PATCH) << patch.level;
+        end(patch.a) > self.grid.size.width - 1 || end(patch.b) > self.grid.size.height - 1
+    }
+
+    /// The least and greatest height of anything that may be drawn of a patch and all below it.
+    fn subtree_heights(&self, patch: Patch) -> [f32; 2] {
+        match self.info(patch) {
+            // NaN: neither the patch nor anything handed up to it has a valid sample; drop nothing on that word.
+            Some(info) if !info.bounds.need_min.is_nan() => [info.bounds.need_min, info.bounds.need_max],
+            _ => [f32::NEG_INFINITY, f32::INFINITY],
+        }
+    }
+
+    fn unseen(&self, patch: Patch, heights: [f32; 2]) -> bool {
+        let Some(frustum) = self.frustum else { return false };
+        let side = PATCH << patch.level;
+        let ground = |index: i64, axis: usize| {
+            let first = (index * side - self.eye.anchor[axis]) as f64 - self.eye.fraction[axis];
+            [first, first + side as f64].map(|s| s * self.grid.spacing_m[axis])
+        };
+        let [x0, x1] = ground(patch.a, 0);
+        let [z0, z1] = ground(patch.b, 1);
+        let scaled = heights.map(|h| {
+            let relative = f64::from(h) - self.eye.height_m;
+            if self.vertical_scale == 0.0 {
+                0.0
+            } else {
+                relative * self.vertical_scale
+            }
+        });
+        let (y0, y1) = (scaled[0].min(scaled[1]), scaled[0].max(scaled[1]));
+        frustum.excludes(DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1))
+    }
+}
+
+/// The least and greatest height of what is drawn between two levels' patches; NaN where both are void.
+fn hull(infos: [Option<&PatchInfo>; 2]) -> [f32; 2] {
+    infos
+        .into_iter()
+        .flatten()
+        .fold([f32::NAN; 2], |[low, high], info| {
+            // `min` and `max` prefer what is a number.
+            [low.min(info.bounds.min), high.max(info.bounds.max)]
+        })
+}
+
+/// Lists `first..end` by distance from `eye`, nearest first.
+fn near_to_far(order: &mut Vec<i64>, first: i64, end: i64, eye: f64) {
+    order.clear();
+    let mut above = (eye.clamp(first as f64, end as f64) as i64).clamp(first, end.max(first));
+    let mut below = above - 1;
+    while above < end || below >= first {
+        // Indices are of unit cells: their centres are half a unit on.
+        let take_above =
+            below < first || (above < end && above as f64 + 0.5 - eye <= eye - (below as f64 + 0.5));
+        if take_above {
+            order.push(above);
+            above += 1;
+        } else {
+            order.push(below);
+            below -= 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_and_columns_are_listed_from_the_eye_outwards() {
+        let mut order = Vec::new();
+        near_to_far(&mut order, 0, 5, 2.2);
+        assert_eq!(order, [2, 1, 3, 0, 4]);
+        near_to_far(&mut order, 3, 6, -7.0);
+        assert_eq!(order, [3, 4, 5]);
+        near_to_far(&mut order, 3, 6, 1e30);
+        assert_eq!(order, [5, 4, 3]);
+        near_to_far(&mut order, 4, 4, 1.0);
+        assert!(order.is_empty());
+    }
+}

@@ -1,0 +1,284 @@
+//! A level's window: which samples are resident, and their mirror on the CPU, from which the GPU is fed.
+
+use half::f16;
+
+use super::constants::{Ring, light_level};
+use super::eye::Eye;
+use super::relief;
+use crate::error::Result;
+use crate::grid::{Grid, PATCH, Patch, Rect, Size, seam_pieces, slot};
+use crate::levels::{Arrival, Bounds, Levels};
+
+/// What a window knows of a patch.
+#[derive(Clone, Copy, Debug)]
+pub struct PatchInfo {
+    /// The patch's stored bounds.
+    pub bounds: Bounds,
+    /// Whether a resident sample of it is void.
+    pub voids: bool,
+}
+
+/// A texel of the light texture: share of the sun, share of the sky, slope to the east, slope to the south.
+pub type LightTexel = [f16; 4];
+
+/// The resident samples of a level around the camera, addressed toroidally.
+#[derive(Clone, Debug)]
+pub struct Window {
+    level: u32,
+    size: Size,
+    n: i64,
+    shift: [i64; 2],
+    resident: Rect,
+    heights: Vec<f32>,
+    light_n: i64,
+    light_level_size: Size,
+    light_shift: [i64; 2],
+    light_resident: Rect,
+    light: Vec<LightTexel>,
+    patch_slots: i64,
+    patch_resident: Rect,
+    patches: Vec<PatchInfo>,
+}
+
+impl Window {
+    /// An empty window of `level`.
+    pub fn new(level: u32, grid: &Grid, ring: &Ring) -> Self {
+        let n = ring.clip_size;
+        let light_n = ring.light_size();
+        let patch_slots = n / PATCH + 2; // a window touches one patch more than it holds, at each end
+        Self {
+            level,
+            size: grid.level(level),
+            n,
+            shift: grid.offset.map(|o| o >> level),
+            resident: Rect::EMPTY,
+            heights: vec![f32::NAN; (n * n) as usize],
+            light_n,
+            light_level_size: grid.level(light_level(level)),
+            light_shift: grid.offset.map(|o| o >> light_level(level)),
+            light_resident: Rect::EMPTY,
+            light: vec![LightTexel::default(); (light_n * light_n) as usize],
+            patch_slots,
+            patch_resident: Rect::EMPTY,
+            patches: vec![
+                PatchInfo {
+                    bounds: Bounds::VOID,
+                    voids: true
+                };
+                (patch_slots * patch_slots) as usize
+            ],
+        }
+    }
+
+    /// The level.
+    pub fn level(&self) -> u32 {
+        self.level
+    }
+
+    /// The resident samples.
+    pub fn resident(&self) -> Rect {
+        self.resident
+    }
+
+    /// The resident light texels, in samples of the level whose light this one holds.
+    pub fn light_resident(&self) -> Rect {
+        self.light_resident
+    }
+
+    /// Where the window of a level of `size` samples belongs for an eye: around it, but held within the level, so
+    /// that a level that fits is held whole and one at whose border the eye stands wastes nothing beyond it.
+    pub fn placed(size: Size, n: i64, level: u32, eye: &Eye) -> Rect {
+        let axis = |anchor: i64, samples: i64| {
+            if samples <= n {
+                return (0, samples);
+            }
+            // From here N samples hold everything nearer than R = N/2 - 2, and a sample more on each side.
+            let first = ((anchor >> level) - n / 2 + 1).clamp(0, samples - n);
+            (first, first + n)
+        };
+        let (x0, x1) = axis(eye.anchor[0], size.width);
+        let (z0, z1) = axis(eye.anchor[1], size.height);
+        Rect::new(x0, z0, x1, z1)
+    }
+
+    /// Where this window belongs for an eye.
+    pub fn target(&self, eye: &Eye) -> Rect {
+        Self::placed(self.size, self.n, self.level, eye)
+    }
+
+    /// The light texels over the ground of the samples `rect`, in samples of the level whose light this one holds.
+    pub fn light_of(&self, rect: Rect) -> Rect {
+        let scale = if self.level == 0 { 1 } else { 2 };
+        Rect::new(rect.x0 * scale, rect.z0 * scale, rect.x1 * scale, rect.z1 * scale)
+            .intersection(self.light_level_size.rect())
+    }
+
+    /// Pieces of `rect`, contiguous in this window's slots.
+    pub fn pieces(&self, rect: Rect) -> impl Iterator<Item = Rect> {
+        seam_pieces(rect, self.n, self.shift)
+    }
+
+    /// Pieces of the light texels `rect`, contiguous in slots.
+    pub fn light_pieces(&self, rect: Rect) -> impl Iterator<Item = Rect> {
+        seam_pieces(rect, self.light_n, self.light_shift)
+    }
+
+    /// Column and row of the slot of sample (i, j).
+    pub fn slot_of(&self, i: i64, j: i64) -> [i64; 2] {
+        [slot(i + self.shift[0], self.n), slot(j + self.shift[1], self.n)]
+    }
+
+    /// Column and row of the slot of light texel (i, j).
+    pub fn light_slot_of(&self, i: i64, j: i64) -> [i64; 2] {
+        [
+            slot(i + self.light_shift[0], self.light_n),
+            slot(j + self.light_shift[1], self.light_n),
+        ]
+    }
+
+    /// The height in metres above the DEM's base at sample (i, j), NaN for no data; none where it is not resident.
+    pub fn height(&self, i: i64, j: i64) -> Option<f32> {
+        self.resident
+            .contains(i, j)
+            .then(|| self.heights[self.index(i, j)])
+    }
+
+    /// What is in the slot of sample (i, j), be it that sample or another: what the shader reads.
+    pub fn slot_height(&self, i: i64, j: i64) -> f32 {
+        self.heights[self.index(i, j)]
+    }
+
+    /// The mirror of the height texture: `n` x `n` slots, row by row.
+    pub fn heights(&self) -> &[f32] {
+        &self.heights
+    }
+
+    /// The mirror of the light texture, row by row of slots.
+    pub fn light(&self) -> &[LightTexel] {
+        &self.light
+    }
+
+    /// Slots along a side of the light texture.
+    pub fn light_size(&self) -> i64 {
+        self.light_n
+    }
+
+    /// What is known of patch (a, b); none where it has no resident sample.
+    pub fn patch(&self, a: i64, b: i64) -> Option<&PatchInfo> {
+        self.patch_resident
+            .contains(a, b)
+            .then(|| &self.patches[self.patch_index(a, b)])
+    }
+
+    /// Moves to `target`, reading into the mirror what `heights` and `light` list, which must be what is exposed.
+    ///
+    /// # Errors
+    /// Those of `source`. The window is then empty.
+    pub fn fill(
+        &mut self,
+        source: &dyn Levels,
+        target: Rect,
+        heights: &[Rect],
+        light: &[Rect],
+        scratch: &mut Scratch,
+    ) -> Result<()> {
+        let before = self.patch_resident;
+        self.resident = Rect::EMPTY;
+        self.light_resident = Rect::EMPTY;
+        self.patch_resident = Rect::EMPTY;
+        for &rect in heights {
+            scratch.heights.resize(rect.area() as usize, 0.0);
+            arrived(source.heights(self.level, rect, &mut scratch.heights)?)?;
+            let first = self.index(rect.x0, rect.z0);
+            copy_rows(&scratch.heights, &mut self.heights[first..], rect, self.n);
+        }
+        for &rect in light {
+            relief::read(source, light_level(self.level), rect, scratch)?;
+            let [x, z] = self.light_slot_of(rect.x0, rect.z0);
+            let first = (z * self.light_n + x) as usize;
+            copy_rows(&scratch.texels, &mut self.light[first..], rect, self.light_n);
+        }
+        self.resident = target;
+        self.light_resident = self.light_of(target);
+        self.fill_patches(
+            source,
+            before,
+            target.touching_patches(self.size),
+            heights,
+            scratch,
+        )
+    }
+
+    fn fill_patches(
+        &mut self,
+        source: &dyn Levels,
+        before: Rect,
+        target: Rect,
+        heights: &[Rect],
+        scratch: &mut Scratch,
+    ) -> Result<()> {
+        for rect in target.difference(before) {
+            scratch.bounds.resize(rect.area() as usize, Bounds::VOID);
+            arrived(source.bounds(self.level, rect, &mut scratch.bounds)?)?;
+            for ((a, b), &bounds) in rect.cells().zip(&scratch.bounds) {
+                let index = self.patch_index(a, b);
+                self.patches[index].bounds = bounds;
+            }
+        }
+        self.patch_resident = target;
+        // A patch keeps its flag when samples leave the window: it may then say void in vain, never the reverse.
+        for &rect in heights {
+            for (a, b) in rect.touching_patches(self.size).intersection(target).cells() {
+                let samples = Patch::new(self.level, a, b)
+                    .samples_within(self.size)
+                    .intersection(self.resident);
+                let voids = samples
+                    .cells()
+                    .any(|(i, j)| self.heights[self.index(i, j)].is_nan());
+                let index = self.patch_index(a, b);
+                self.patches[index].voids = voids;
+            }
+        }
+        Ok(())
+    }
+
+    fn index(&self, i: i64, j: i64) -> usize {
+        let [x, z] = self.slot_of(i, j);
+        (z * self.n + x) as usize
+    }
+
+    fn patch_index(&self, a: i64, b: i64) -> usize {
+        (slot(b, self.patch_slots) * self.patch_slots + slot(a, self.patch_slots)) as usize
+    }
+}
+
+/// Memory that is used anew at every update.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    heights: Vec<f32>,
+    bounds: Vec<Bounds>,
+    pub(super) relief: Vec<f32>,
+    pub(super) shares: Vec<crate::levels::LightSample>,
+    pub(super) texels: Vec<LightTexel>,
+}
+
+/// Copies a rectangle's rows into the rows of a square of `n` slots, from its first slot on.
+fn copy_rows<T: Copy>(rows: &[T], slots: &mut [T], rect: Rect, n: i64) {
+    let (width, n) = (rect.width() as usize, n as usize);
+    for (row, out) in rows.chunks_exact(width).zip(slots.chunks_mut(n)) {
+        out[..width].copy_from_slice(row);
+    }
+}
+
+/// The clipmap waits for its source; one that answers without the data cannot be drawn from.
+pub(super) fn arrived(arrival: Arrival) -> Result<()> {
+    match arrival {
+        Arrival::Arrived => Ok(()),
+        Arrival::Missing => Err(crate::Error::new(
+            crate::ErrorKind::Unsupported,
+            "terrain",
+            "data are missing that the frame needs",
+        )
+        .advice("use a source that waits for its data")),
+    }
+}

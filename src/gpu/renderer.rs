@@ -1,0 +1,297 @@
+//! Pipelines that draw a clipmap into the caller's render pass.
+
+use wgpu::util::DeviceExt as _;
+
+use super::shader;
+use super::textures::{UploadReport, ViewTextures};
+use crate::clipmap::{CLOSER_TRIANGLES, Clipmap, Instance, PATCH_TRIANGLES, Side};
+use crate::grid::PATCH;
+use crate::light::Sun;
+use crate::shade::ViewMode;
+
+/// The depth format drawn into: 32-bit float, cleared to 0, nearer is greater.
+pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// What pipelines are made for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RendererOptions {
+    /// Format of the colour target. Formats without sRGB encoding get encoded colours.
+    pub colour_format: wgpu::TextureFormat,
+    /// Samples a pixel: 1 or 4.
+    pub sample_count: u32,
+    /// What is shown.
+    pub view_mode: ViewMode,
+    /// Whether the terrain has traced light ([`Clipmap::has_light`]); else light follows from slopes and sun.
+    pub traced_light: bool,
+    /// Whether the ground is tinted by height and slope.
+    pub tint: bool,
+    /// Whether air lies between ground and eye.
+    pub haze: bool,
+}
+
+/// What a draw did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DrawReport {
+    /// Draw calls.
+    pub draw_calls: u64,
+    /// Triangles, closing ones included.
+    pub triangles: u64,
+}
+
+/// Pipelines and static buffers for one target format; shared by any number of views.
+#[derive(Debug)]
+pub struct ClipmapRenderer {
+    layout: wgpu::BindGroupLayout,
+    sampler: wgpu::Sampler,
+    whole: wgpu::RenderPipeline,
+    ragged: wgpu::RenderPipeline,
+    indices: wgpu::Buffer,
+}
+
+impl ClipmapRenderer {
+    /// Pipelines for `options`.
+    pub fn new(device: &wgpu::Device, options: &RendererOptions) -> Self {
+        let layout = bind_group_layout(device);
+        let module = shader::module(device, "terrain.wgsl");
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("clipscape terrain layout"),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let pipeline = |label, ragged| pipeline(device, label, &module, &pipeline_layout, options, ragged);
+        Self {
+            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("clipscape light sampler"),
+                address_mode_u: wgpu::AddressMode::Repeat,
+                address_mode_v: wgpu::AddressMode::Repeat,
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                ..Default::default()
+            }),
+            whole: pipeline("clipscape terrain whole patches", false),
+            ragged: pipeline("clipscape terrain ragged patches", true),
+            indices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("clipscape patch indices"),
+                contents: bytemuck::cast_slice(&patch_indices()),
+                usage: wgpu::BufferUsages::INDEX,
+            }),
+            layout,
+        }
+    }
+
+    /// GPU state for a view of `clipmap`, lit by `sun` where no light was traced.
+    pub fn textures(&self, device: &wgpu::Device, clipmap: &Clipmap, sun: Sun) -> ViewTextures {
+        ViewTextures::new(device, &self.layout, &self.sampler, clipmap, sun)
+    }
+
+    /// The layout of a view's bind group.
+    pub fn bind_group_layout(&self) -> &wgpu::BindGroupLayout {
+        &self.layout
+    }
+
+    /// Brings `textures` up to the clipmap's last update. What is written takes effect before the commands of the
+    /// queue's next submission.
+    pub fn upload(
+        &self,
+        queue: &wgpu::Queue,
+        clipmap: &Clipmap,
+        textures: &mut ViewTextures,
+    ) -> UploadReport {
+        textures.upload(queue, clipmap)
+    }
+
+    /// Draws the clipmap's selection. The pass must have a colour target as in the options and a depth target of
+    /// [`DEPTH_FORMAT`], cleared to 0.
+    pub fn draw(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        clipmap: &Clipmap,
+        textures: &ViewTextures,
+    ) -> DrawReport {
+        let selection = clipmap.selection();
+        let mut report = DrawReport::default();
+        pass.set_bind_group(0, &textures.bind_group, &[]);
+        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint16);
+        pass.set_vertex_buffer(0, textures.instances.slice(..));
+        let patch = 0..3 * PATCH_TRIANGLES as u32;
+        let mut first = 0;
+        let mut draw = |pass: &mut wgpu::RenderPass<'_>, indices: std::ops::Range<u32>, count: usize| {
+            let instances = first..first + count as u32;
+            first = instances.end;
+            if !instances.is_empty() {
+                report.draw_calls += 1;
+                report.triangles += u64::from(indices.end - indices.start) / 3 * count as u64;
+                pass.draw_indexed(indices, 0, instances);
+            }
+        };
+        pass.set_pipeline(&self.whole);
+        draw(pass, patch.clone(), selection.whole.len());
+        pass.set_pipeline(&self.ragged);
+        draw(pass, patch.clone(), selection.ragged.len());
+        let mut closers = patch.end;
+        for side in &selection.closers {
+            let indices = closers..closers + 3 * CLOSER_TRIANGLES as u32;
+            closers = indices.end;
+            draw(pass, indices, side.len());
+        }
+        report
+    }
+}
+
+fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    use wgpu::ShaderStages as Stages;
+    let uniform = wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Uniform,
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
+    let texture = |filterable| wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable },
+        view_dimension: wgpu::TextureViewDimension::D2Array,
+        multisampled: false,
+    };
+    let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+    let both = Stages::VERTEX_FRAGMENT;
+    let bindings = [
+        (both, uniform),
+        (both, uniform),
+        (Stages::VERTEX | Stages::COMPUTE, texture(false)),
+        (Stages::VERTEX | Stages::COMPUTE, texture(false)),
+        (Stages::FRAGMENT, uniform),
+        (Stages::FRAGMENT, texture(true)),
+        (Stages::FRAGMENT, sampler),
+    ];
+    let entries: Vec<_> = bindings
+        .into_iter()
+        .zip(0..)
+        .map(|((visibility, ty), binding)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: if ty == uniform && visibility == both {
+                both | Stages::COMPUTE
+            } else {
+                visibility
+            },
+            ty,
+            count: None,
+        })
+        .collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("clipscape view layout"),
+        entries: &entries,
+    })
+}
+
+fn pipeline(
+    device: &wgpu::Device,
+    label: &str,
+    module: &wgpu::ShaderModule,
+    layout: &wgpu::PipelineLayout,
+    options: &RendererOptions,
+    ragged: bool,
+) -> wgpu::RenderPipeline {
+    let on = |flag: bool| f64::from(u8::from(flag));
+    let constants = [
+        ("RAGGED", on(ragged)),
+        ("VIEW_MODE", f64::from(options.view_mode.index())),
+        ("TRACED_LIGHT", on(options.traced_light)),
+        ("TINT", on(options.tint)),
+        ("HAZE", on(options.haze)),
+        ("ENCODE_SRGB", on(!options.colour_format.is_srgb())),
+    ];
+    let compilation_options = wgpu::PipelineCompilationOptions {
+        constants: &constants,
+        ..Default::default()
+    };
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(label),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("vertex"),
+            compilation_options: compilation_options.clone(),
+            buffers: &[Some(wgpu::VertexBufferLayout {
+                array_stride: size_of::<Instance>() as u64,
+                step_mode: wgpu::VertexStepMode::Instance,
+                attributes: &wgpu::vertex_attr_array![0 => Sint32x2, 1 => Uint32, 2 => Float32],
+            })],
+        },
+        // No culling: closing triangles have no front, and terrain may be seen from below.
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Greater),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState {
+            count: options.sample_count,
+            ..Default::default()
+        },
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some("fragment"),
+            compilation_options,
+            targets: &[Some(options.colour_format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+/// Indices into the 9 x 9 corners of a patch: its quads, split from north-west to south-east, then for each [`Side`]
+/// the triangles of no area (coarse end, middle, coarse end) that close it against a coarser neighbour.
+fn patch_indices() -> Vec<u16> {
+    let corner = |x: i64, z: i64| (z * (PATCH + 1) + x) as u16;
+    let mut indices = Vec::new();
+    for z in 0..PATCH {
+        for x in 0..PATCH {
+            let [nw, ne] = [corner(x, z), corner(x + 1, z)];
+            let [sw, se] = [corner(x, z + 1), corner(x + 1, z + 1)];
+            indices.extend([nw, sw, se, nw, se, ne]);
+        }
+    }
+    for side in Side::ALL {
+        for k in (0..PATCH).step_by(2) {
+            indices.extend([k, k + 1, k + 2].map(|k| match side {
+                Side::West => corner(0, k),
+                Side::East => corner(PATCH, k),
+                Side::North => corner(k, 0),
+                Side::South => corner(k, PATCH),
+            }));
+        }
+    }
+    indices
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quads_are_split_from_north_west_to_south_east_and_sides_closed() {
+        let indices = patch_indices();
+        let triangles = PATCH_TRIANGLES + 4 * CLOSER_TRIANGLES;
+        assert_eq!(indices.len() as u64, 3 * triangles);
+        let point = |i: u16| (i64::from(i) % (PATCH + 1), i64::from(i) / (PATCH + 1));
+        for t in indices[..3 * PATCH_TRIANGLES as usize].chunks(3) {
+            let points = t.iter().map(|&i| point(i)).collect::<Vec<_>>();
+            let low = (
+                points.iter().map(|p| p.0).min().unwrap(),
+                points.iter().map(|p| p.1).min().unwrap(),
+            );
+            assert!(
+                points.contains(&low) && points.contains(&(low.0 + 1, low.1 + 1)),
+                "{points:?}"
+            );
+        }
+        for t in indices[3 * PATCH_TRIANGLES as usize..].chunks(3) {
+            let [a, b, c] = [point(t[0]), point(t[1]), point(t[2])];
+            assert_eq!(
+                (a.0 + c.0, a.1 + c.1),
+                (2 * b.0, 2 * b.1),
+                "the middle lies between the ends"
+            );
+        }
+    }
+}

@@ -1,0 +1,341 @@
+//! Frames without a window, through the same face that an embedding program uses.
+
+use std::time::Instant;
+
+use crate::camera::View;
+use crate::clipmap::{Clipmap, ClipmapOptions, UpdateReport};
+use crate::error::{Error, ErrorKind, Result};
+use crate::gpu::{
+    ClipmapRenderer, DEPTH_FORMAT, DrawReport, Gpu, RendererOptions, SkyRenderer, UploadReport, ViewTextures,
+    read,
+};
+use crate::levels::Levels;
+use crate::light::Sun;
+use crate::shade::ViewMode;
+
+/// The colour format drawn into: 8 bits a channel, sRGB.
+pub const COLOUR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
+
+/// How frames are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeadlessOptions {
+    /// Width and height in pixels.
+    pub size_px: [u32; 2],
+    /// Samples a pixel: 1 or 4.
+    pub sample_count: u32,
+    /// What is shown.
+    pub view_mode: ViewMode,
+    /// Whether the ground is tinted by height and slope.
+    pub tint: bool,
+    /// Whether air lies between ground and eye.
+    pub haze: bool,
+    /// Whether the light that came with the terrain is used; else light follows from slopes and sun.
+    pub traced_light: bool,
+    /// The sun: by it slopes are lit where no traced light is used, and around it the sky glows.
+    pub sun: Sun,
+    /// Clip size, levels, transition, vertical scale, culling.
+    pub clipmap: ClipmapOptions,
+}
+
+/// A frame, and what making it took.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Pixels, row by row from the top left: red, green, blue, alpha, sRGB.
+    pub rgba8: Vec<u8>,
+    /// What the update did.
+    pub update: UpdateReport,
+    /// What was uploaded.
+    pub upload: UploadReport,
+    /// What was drawn.
+    pub draw: DrawReport,
+    /// Moving the windows (what is newly exposed is read) and selecting patches, in wall milliseconds.
+    pub plan_ms: f64,
+    /// Handing the uploads to the device.
+    pub upload_ms: f64,
+    /// Recording, submitting and waiting for the draw, without reading back.
+    pub draw_ms: f64,
+    /// The draw by the device's own clock, where it has one.
+    pub gpu_ms: Option<f64>,
+    /// All of it, reading back included.
+    pub frame_ms: f64,
+}
+
+/// Draws frames of one terrain into memory.
+#[derive(Debug)]
+pub struct Headless {
+    gpu: Gpu,
+    options: HeadlessOptions,
+    clipmap: Clipmap,
+    renderer: ClipmapRenderer,
+    sky: SkyRenderer,
+    textures: ViewTextures,
+    targets: Targets,
+    timer: Option<Timer>,
+}
+
+#[derive(Debug)]
+struct Targets {
+    colour: wgpu::Texture,
+    multisampled: Option<wgpu::TextureView>,
+    colour_view: wgpu::TextureView,
+    depth: wgpu::Texture,
+    depth_view: wgpu::TextureView,
+}
+
+#[derive(Debug)]
+struct Timer {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    mappable: wgpu::Buffer,
+    period_ns: f64,
+}
+
+impl Headless {
+    /// Prepares to draw `levels` on `gpu`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] for options out of range; those of `levels`.
+    pub fn new(gpu: Gpu, levels: &dyn Levels, options: &HeadlessOptions) -> Result<Self> {
+        if ![1, 4].contains(&options.sample_count) {
+            let what = format!("{} samples a pixel", options.sample_count);
+            return Err(Error::new(ErrorKind::Misuse, "multisampling", what).advice("use 1 or 4"));
+        }
+        let clipmap = Clipmap::new(levels, &options.clipmap)?;
+        let renderer_options = RendererOptions {
+            colour_format: COLOUR_FORMAT,
+            sample_count: options.sample_count,
+            view_mode: options.view_mode,
+            traced_light: options.traced_light && clipmap.has_light(),
+            tint: options.tint,
+            haze: options.haze,
+        };
+        let renderer = ClipmapRenderer::new(&gpu.device, &renderer_options);
+        let textures = renderer.textures(&gpu.device, &clipmap, options.sun);
+        Ok(Self {
+            sky: SkyRenderer::new(&gpu.device, &renderer_options),
+            targets: Targets::new(&gpu.device, options),
+            timer: gpu.has_timestamps().then(|| Timer::new(&gpu)),
+            gpu,
+            options: *options,
+            clipmap,
+            renderer,
+            textures,
+        })
+    }
+
+    /// Draws the frame that `camera` sees.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] for a camera of other than finite numbers, [`ErrorKind::Device`] where the device fails;
+    /// those of `levels`.
+    pub fn frame(&mut self, levels: &dyn Levels, camera: &crate::Camera) -> Result<Frame> {
+        let start = Instant::now();
+        let view = View::new(*camera, self.options.size_px)?;
+        let update = *self.clipmap.update(levels, &view)?;
+        let planned = Instant::now();
+        let upload = self
+            .renderer
+            .upload(&self.gpu.queue, &self.clipmap, &mut self.textures);
+        self.sky.upload(
+            &self.gpu.queue,
+            &view,
+            &self.textures.shade_constants(&self.clipmap),
+        );
+        let uploaded = Instant::now();
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                label: Some("clipscape frame"),
+            });
+        let draw = self.record(&mut encoder);
+        self.gpu.queue.submit([encoder.finish()]);
+        self.wait()?;
+        let drawn = Instant::now();
+        let rgba8 = self.gpu.read_texture(&self.targets.colour, 0)?;
+        let gpu_ms = self.timer.as_ref().map(|t| t.read_ms(&self.gpu)).transpose()?;
+        let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
+        Ok(Frame {
+            rgba8,
+            update,
+            upload,
+            draw,
+            plan_ms: ms(start, planned),
+            upload_ms: ms(planned, uploaded),
+            draw_ms: ms(uploaded, drawn),
+            gpu_ms,
+            frame_ms: ms(start, Instant::now()),
+        })
+    }
+
+    fn record(&self, encoder: &mut wgpu::CommandEncoder) -> DrawReport {
+        let targets = &self.targets;
+        let (view, resolve_target) = match &targets.multisampled {
+            Some(view) => (view, Some(&targets.colour_view)),
+            None => (&targets.colour_view, None),
+        };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("clipscape terrain and sky"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view,
+                depth_slice: None,
+                resolve_target,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &targets.depth_view,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: self.timer.as_ref().map(|timer| wgpu::RenderPassTimestampWrites {
+                query_set: &timer.queries,
+                beginning_of_pass_write_index: Some(0),
+                end_of_pass_write_index: Some(1),
+            }),
+            ..Default::default()
+        });
+        let report = self.renderer.draw(&mut pass, &self.clipmap, &self.textures);
+        if self.options.view_mode == ViewMode::Shaded {
+            self.sky.draw(&mut pass);
+        }
+        drop(pass);
+        if let Some(timer) = &self.timer {
+            encoder.resolve_query_set(&timer.queries, 0..2, &timer.resolved, 0);
+            encoder.copy_buffer_to_buffer(&timer.resolved, 0, &timer.mappable, 0, 16);
+        }
+        report
+    }
+
+    fn wait(&self) -> Result<()> {
+        self.gpu
+            .device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map(drop)
+            .map_err(|e| {
+                Error::new(
+                    ErrorKind::Device,
+                    "graphics",
+                    format!("the device does not answer ({e})"),
+                )
+            })
+    }
+
+    /// The depth of the last frame, row by row from the top left: near distance over distance along the view axis, 0
+    /// where no terrain is.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] with several samples a pixel, [`ErrorKind::Device`] where the device fails.
+    pub fn read_depth(&self) -> Result<Vec<f32>> {
+        if self.options.sample_count != 1 {
+            let what = format!("depth has {} samples a pixel", self.options.sample_count);
+            return Err(Error::new(ErrorKind::Misuse, "multisampling", what)
+                .advice("draw with 1 sample to read depth"));
+        }
+        let bytes = self.gpu.read_texture(&self.targets.depth, 0)?;
+        Ok(bytemuck::pod_collect_to_vec(&bytes))
+    }
+
+    /// The clipmap as of the last frame.
+    pub fn clipmap(&self) -> &Clipmap {
+        &self.clipmap
+    }
+
+    /// The textures as of the last frame.
+    pub fn textures(&self) -> &ViewTextures {
+        &self.textures
+    }
+
+    /// The pipelines.
+    pub fn renderer(&self) -> &ClipmapRenderer {
+        &self.renderer
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+}
+
+impl Targets {
+    fn new(device: &wgpu::Device, options: &HeadlessOptions) -> Self {
+        let texture = |label, format, sample_count, usage| {
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d {
+                    width: options.size_px[0],
+                    height: options.size_px[1],
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
+                view_formats: &[],
+            })
+        };
+        let readable = wgpu::TextureUsages::COPY_SRC;
+        let samples = options.sample_count;
+        let colour = texture("clipscape colour", COLOUR_FORMAT, 1, readable);
+        let depth_usage = if samples == 1 {
+            readable
+        } else {
+            wgpu::TextureUsages::empty()
+        };
+        let depth = texture("clipscape depth", DEPTH_FORMAT, samples, depth_usage);
+        let multisampled = (samples > 1).then(|| {
+            texture(
+                "clipscape multisampled colour",
+                COLOUR_FORMAT,
+                samples,
+                wgpu::TextureUsages::empty(),
+            )
+            .create_view(&Default::default())
+        });
+        Self {
+            colour_view: colour.create_view(&Default::default()),
+            depth_view: depth.create_view(&Default::default()),
+            colour,
+            multisampled,
+            depth,
+        }
+    }
+}
+
+impl Timer {
+    fn new(gpu: &Gpu) -> Self {
+        let buffer = |label, usage| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: 16,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        use wgpu::BufferUsages as Usage;
+        Self {
+            queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("clipscape frame timestamps"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2,
+            }),
+            resolved: buffer(
+                "clipscape resolved timestamps",
+                Usage::QUERY_RESOLVE | Usage::COPY_SRC,
+            ),
+            mappable: buffer("clipscape mappable timestamps", Usage::COPY_DST | Usage::MAP_READ),
+            period_ns: f64::from(gpu.queue.get_timestamp_period()),
+        }
+    }
+
+    fn read_ms(&self, gpu: &Gpu) -> Result<f64> {
+        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&read(&gpu.device, &self.mappable)?);
+        Ok(ticks[1].saturating_sub(ticks[0]) as f64 * self.period_ns / 1e6)
+    }
+}

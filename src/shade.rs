@@ -1,0 +1,160 @@
+//! The look: its constants, emitted into WGSL, and the twin of the fragment stage's colours.
+//!
+//! Colours are linear RGB radiance for a white surface of 1, before exposure. The air follows Beer and Lambert with a
+//! density that falls exponentially with height, integrated in closed form along the ray.
+
+use std::fmt::Write;
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use crate::clipmap::{LEVEL_SLOTS, VOID_HEIGHT};
+use crate::grid::PATCH;
+use crate::light::Sun;
+
+/// What a frame shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ViewMode {
+    /// Ground colours in light and air.
+    #[default]
+    Shaded,
+    /// The bare light, grey.
+    Light,
+    /// A colour per level, whiter where a level morphs into the next.
+    Level,
+}
+
+impl ViewMode {
+    /// All modes with the names by which people ask for them.
+    pub const NAMED: [(&'static str, Self); 3] = [
+        ("shaded", Self::Shaded),
+        ("light", Self::Light),
+        ("level", Self::Level),
+    ];
+
+    /// The number by which the shader knows it.
+    pub fn index(self) -> u32 {
+        self as u32
+    }
+}
+
+/// Shading constants of a frame, as in `shaders/shared/shade.wgsl`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct ShadeConstants {
+    /// Unit vector to the sun: east, up, south; the fourth is unused.
+    pub to_sun: [f32; 4],
+    /// Least height of the DEM in metres above its base: where the ground's tint begins.
+    pub low_m: f32,
+    /// Greatest height of the DEM in metres above its base.
+    pub high_m: f32,
+    /// Height of the DEM's base in metres.
+    pub base_m: f32,
+    /// Factor on slopes where light follows from them: the vertical scale.
+    pub slope_scale: f32,
+}
+
+impl ShadeConstants {
+    /// The constants for a DEM with heights in `range_m` above `base_m`.
+    pub fn new(sun: &Sun, range_m: [f32; 2], base_m: f64, vertical_scale: f64) -> Self {
+        let [x, y, z] = sun.direction().to_array();
+        Self {
+            to_sun: [x as f32, y as f32, z as f32, 0.0],
+            low_m: range_m[0],
+            high_m: range_m[1],
+            base_m: base_m as f32,
+            slope_scale: vertical_scale as f32,
+        }
+    }
+}
+
+/// Light of the full sun on a surface that faces it.
+pub const SUN_LIGHT: Vec3 = Vec3::new(2.9, 2.65, 2.25);
+/// Light of the whole sky.
+pub const SKY_LIGHT: Vec3 = Vec3::new(0.42, 0.55, 0.78);
+/// Share of the sun and of the sky in the grey of the light view.
+pub const LIGHT_VIEW: [f32; 2] = [0.8, 0.2];
+/// Ground at the lowest.
+pub const GROUND_LOW: Vec3 = Vec3::new(0.095, 0.145, 0.045);
+/// Ground a little below the middle.
+pub const GROUND_MIDDLE: Vec3 = Vec3::new(0.185, 0.20, 0.085);
+/// Ground at the highest, where it is not snow.
+pub const GROUND_HIGH: Vec3 = Vec3::new(0.33, 0.27, 0.19);
+/// Steep ground.
+pub const GROUND_ROCK: Vec3 = Vec3::new(0.235, 0.215, 0.20);
+/// Snow.
+pub const GROUND_SNOW: Vec3 = Vec3::new(0.78, 0.82, 0.88);
+/// Ground without tint.
+pub const GROUND_PLAIN: Vec3 = Vec3::new(0.45, 0.45, 0.45);
+/// Up component of the normal below which ground is bare rock.
+pub const ROCK_UP: f32 = 0.70;
+/// Up component of the normal above which ground is covered.
+pub const MEADOW_UP: f32 = 0.90;
+/// Heights in metres between which snow begins.
+pub const SNOW_M: [f32; 2] = [2350.0, 2900.0];
+/// Relief in metres below which the tint does not stretch over all its colours.
+pub const RELIEF_LEAST_M: f32 = 300.0;
+/// Height in metres by which the air's density falls to 1/e.
+pub const HAZE_SCALE_M: f32 = 8000.0;
+/// Extinction by wavelength at the lowest ground, per metre: blue scatters most.
+pub const HAZE_PER_M: Vec3 = Vec3::new(0.9e-5, 1.3e-5, 2.0e-5);
+/// The sky at the horizon, which is also the colour of much air.
+pub const SKY_HORIZON: Vec3 = Vec3::new(0.78, 0.93, 1.12);
+/// The sky overhead.
+pub const SKY_ZENITH: Vec3 = Vec3::new(0.12, 0.30, 0.72);
+/// Below the horizon, where no terrain is.
+pub const SKY_BELOW: Vec3 = Vec3::new(0.42, 0.50, 0.60);
+/// Around the sun.
+pub const SUN_GLOW: Vec3 = Vec3::new(0.55, 0.42, 0.22);
+/// Exposure before the tone curve `1 - exp(-x)`.
+pub const EXPOSURE: f32 = 1.25;
+/// Interpolated validity below which a fragment belongs to a hole. A corner's share of a triangle may round to a few
+/// ulps above 0 along the opposite side; 2^-16 of a triangle is below any pixel.
+pub const VALID_LEAST: f32 = 1.0 - 1.0 / 65536.0;
+
+/// The constants that shaders share with this crate, as WGSL declarations.
+pub fn wgsl_constants() -> String {
+    let mut out = String::new();
+    let mut line = |name: &str, value: String| {
+        writeln!(out, "const {name} = {value};").expect("a String takes all that is written");
+    };
+    let float = |v: f32| format!("{v:?}f");
+    let vector = |v: Vec3| format!("vec3<f32>({:?}, {:?}, {:?})", v.x, v.y, v.z);
+    line("LEVEL_SLOTS", format!("{LEVEL_SLOTS}u"));
+    line("PATCH_CORNERS", format!("{}u", PATCH + 1));
+    line("VIEW_LIGHT", format!("{}u", ViewMode::Light.index()));
+    line("VIEW_LEVEL", format!("{}u", ViewMode::Level.index()));
+    for (name, value) in [
+        ("VOID_HEIGHT", VOID_HEIGHT),
+        ("LIGHT_VIEW_SUN", LIGHT_VIEW[0]),
+        ("LIGHT_VIEW_SKY", LIGHT_VIEW[1]),
+        ("ROCK_UP", ROCK_UP),
+        ("MEADOW_UP", MEADOW_UP),
+        ("SNOW_LOW_M", SNOW_M[0]),
+        ("SNOW_HIGH_M", SNOW_M[1]),
+        ("RELIEF_LEAST_M", RELIEF_LEAST_M),
+        ("HAZE_SCALE_M", HAZE_SCALE_M),
+        ("EXPOSURE", EXPOSURE),
+        ("VALID_LEAST", VALID_LEAST),
+    ] {
+        line(name, float(value));
+    }
+    for (name, value) in [
+        ("SUN_LIGHT", SUN_LIGHT),
+        ("SKY_LIGHT", SKY_LIGHT),
+        ("GROUND_LOW", GROUND_LOW),
+        ("GROUND_MIDDLE", GROUND_MIDDLE),
+        ("GROUND_HIGH", GROUND_HIGH),
+        ("GROUND_ROCK", GROUND_ROCK),
+        ("GROUND_SNOW", GROUND_SNOW),
+        ("GROUND_PLAIN", GROUND_PLAIN),
+        ("HAZE_PER_M", HAZE_PER_M),
+        ("SKY_HORIZON", SKY_HORIZON),
+        ("SKY_ZENITH", SKY_ZENITH),
+        ("SKY_BELOW", SKY_BELOW),
+        ("SUN_GLOW", SUN_GLOW),
+    ] {
+        line(name, vector(value));
+    }
+    out
+}

@@ -1,0 +1,336 @@
+//! The parts of a terrain file: names, channels, grids, and the order in which their tiles stand.
+//!
+//! | part | channels | grid |
+//! |---|---|---|
+//! | `height.0` ... | `Y` f32 | samples of the level |
+//! | `bounds.0` ... | `error`, `max`, `min`, `need_error`, `need_max`, `need_min` f32 | patches of the level |
+//! | `light.0` ... (where there is light) | `sky`, `sun` f16 | samples of the level |
+//! | `check.0` ... | `height`, `light` u32 | tiles of `height.N`; `light` is 0 without light |
+//! | `check.bounds` | `bounds` u32 | row N: the tiles of `bounds.N`, row by row; cells beyond them are 0 |
+//!
+//! Parts stand in the order of this table, each kind from the finest level to the coarsest. All are tiled
+//! 256 x 256 with one resolution level, ZIP, and share one display window, that of `height.0`. Channels are
+//! alphabetical, as OpenEXR wants them.
+//!
+//! *Checks.* A check is the CRC-32C of a tile's decoded samples as OpenEXR lays out an uncompressed tile: row
+//! by row, in each row channel by channel in alphabetical order, samples little-endian, the tile cut at the
+//! part's edge.
+//!
+//! *Order of tiles.* By the row of level 0 that must have been seen before the tile is finished (the last
+//! under the tile, but at most the DEM's last); where equal the finer level first; then heights, bounds, light,
+//! check; within a row of tiles from west to east. `check.bounds` is last. So a single thread that works from
+//! north to south can write every tile as soon as it is whole.
+
+use exr::meta::attribute::SampleType;
+
+use crate::grid::{Grid, PATCH, Rect, Size};
+
+/// The version of the layout and the attributes; a reader reads its own only.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// Samples along a tile's side.
+pub const TILE: i64 = 256;
+
+/// The greatest side of a part: OpenEXR's windows end below 2^30 - 1.
+pub const MAX_SIDE: i64 = (1 << 30) - 2;
+
+/// What a part holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// Heights of a level.
+    Height,
+    /// Bounds of a level's patches.
+    Bounds,
+    /// Light of a level.
+    Light,
+    /// Checks of the tiles of a level's heights and light.
+    Check,
+    /// Checks of the tiles of all levels' bounds.
+    CheckBounds,
+}
+
+/// One part of the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// What it holds.
+    pub kind: Kind,
+    /// Of which level; 0 for [`Kind::CheckBounds`].
+    pub level: u32,
+    /// Its samples.
+    pub size: Size,
+}
+
+impl Part {
+    /// Its name in the file.
+    pub fn name(&self) -> String {
+        match self.kind {
+            Kind::Height => format!("height.{}", self.level),
+            Kind::Bounds => format!("bounds.{}", self.level),
+            Kind::Light => format!("light.{}", self.level),
+            Kind::Check => format!("check.{}", self.level),
+            Kind::CheckBounds => "check.bounds".into(),
+        }
+    }
+
+    /// Its channels in the order of the file, all of one type.
+    pub fn channels(&self) -> (&'static [&'static str], SampleType) {
+        match self.kind {
+            Kind::Height => (&["Y"], SampleType::F32),
+            Kind::Bounds => (
+                &["error", "max", "min", "need_error", "need_max", "need_min"],
+                SampleType::F32,
+            ),
+            Kind::Light => (&["sky", "sun"], SampleType::F16),
+            Kind::Check => (&["height", "light"], SampleType::U32),
+            Kind::CheckBounds => (&["bounds"], SampleType::U32),
+        }
+    }
+
+    /// Bytes of one channel's sample.
+    pub fn sample_bytes(&self) -> usize {
+        self.channels().1.bytes_per_sample()
+    }
+
+    /// The tiles that cover it.
+    pub fn tiles(&self) -> Size {
+        let count = |n: i64| (n + TILE - 1) / TILE;
+        Size {
+            width: count(self.size.width),
+            height: count(self.size.height),
+        }
+    }
+
+    /// The samples of tile (x, y), cut at the part's edge.
+    pub fn tile_rect(&self, x: i64, y: i64) -> Rect {
+        Rect::new(x * TILE, y * TILE, (x + 1) * TILE, (y + 1) * TILE).intersection(self.size.rect())
+    }
+
+    /// The bytes of the decoded samples in `rect`.
+    pub fn bytes(&self, rect: Rect) -> usize {
+        rect.area() as usize * self.channels().0.len() * self.sample_bytes()
+    }
+}
+
+/// A row of tiles of a part, from west to east.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileRow {
+    /// Index of the part.
+    pub part: usize,
+    /// Row of tiles.
+    pub y: i64,
+}
+
+/// All parts of a terrain file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layout {
+    parts: Vec<Part>,
+    levels: u32,
+    light: bool,
+}
+
+impl Layout {
+    /// The parts for a DEM of `grid`, with light or without; else what is wrong with the grid, as a phrase.
+    pub fn new(grid: &Grid, light: bool) -> Result<Self, String> {
+        grid.check()?;
+        let Size { width, height } = grid.size;
+        if width > MAX_SIDE || height > MAX_SIDE {
+            return Err(format!(
+                "a size of {width} x {height} samples is above {MAX_SIDE} a side"
+            ));
+        }
+        let levels = grid.file_levels();
+        let mut parts = Vec::new();
+        let mut per_level = |kind, size: &dyn Fn(u32) -> Size| {
+            parts.extend((0..levels).map(|level| Part {
+                kind,
+                level,
+                size: size(level),
+            }));
+        };
+        per_level(Kind::Height, &|l| grid.level(l));
+        per_level(Kind::Bounds, &|l| grid.patches(l));
+        if light {
+            per_level(Kind::Light, &|l| grid.level(l));
+        }
+        let tiles_of = |kind, size| Part { kind, level: 0, size }.tiles();
+        per_level(Kind::Check, &|l| tiles_of(Kind::Height, grid.level(l)));
+        let bounds_tiles = tiles_of(Kind::Bounds, grid.patches(0)).samples();
+        let size = Size {
+            width: bounds_tiles,
+            height: i64::from(levels),
+        };
+        parts.push(Part {
+            kind: Kind::CheckBounds,
+            level: 0,
+            size,
+        });
+        // OpenEXR counts the tiles of a part in i32.
+        for part in &parts {
+            let Size { width, height } = part.size;
+            if part.tiles().samples() > i64::from(i32::MAX) || width > MAX_SIDE || height > MAX_SIDE {
+                let name = part.name();
+                return Err(format!(
+                    "its part {name} of {width} x {height} is more than OpenEXR can hold"
+                ));
+            }
+        }
+        Ok(Self { parts, levels, light })
+    }
+
+    /// All parts in the order of the file.
+    pub fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// The number of levels.
+    pub fn levels(&self) -> u32 {
+        self.levels
+    }
+
+    /// The index of the part of `kind` and `level`. Light only where there is light.
+    pub fn part(&self, kind: Kind, level: u32) -> usize {
+        let before = match kind {
+            Kind::Height => 0,
+            Kind::Bounds => 1,
+            Kind::Light => 2,
+            Kind::Check | Kind::CheckBounds => 2 + usize::from(self.light),
+        };
+        match kind {
+            Kind::CheckBounds => self.parts.len() - 1,
+            _ => before * self.levels as usize + level as usize,
+        }
+    }
+
+    /// Where the check of tile (x, y) of part `part` stands: part, sample and channel. None for checks.
+    pub fn check_of(&self, part: usize, x: i64, y: i64) -> Option<Check> {
+        let Part { kind, level, .. } = self.parts[part];
+        match kind {
+            Kind::Height => Some(Check {
+                part: self.part(Kind::Check, level),
+                x,
+                y,
+                channel: 0,
+            }),
+            Kind::Light => Some(Check {
+                part: self.part(Kind::Check, level),
+                x,
+                y,
+                channel: 1,
+            }),
+            Kind::Bounds => {
+                let x = y * self.parts[part].tiles().width + x;
+                Some(Check {
+                    part: self.part(Kind::CheckBounds, 0),
+                    x,
+                    y: i64::from(level),
+                    channel: 0,
+                })
+            }
+            Kind::Check | Kind::CheckBounds => None,
+        }
+    }
+
+    /// The number of tiles in the file.
+    pub fn tile_count(&self) -> u64 {
+        self.parts.iter().map(|p| p.tiles().samples() as u64).sum()
+    }
+
+    /// All rows of tiles in the order of the file.
+    pub fn order(&self) -> Vec<TileRow> {
+        let rows = self.parts[0].size.height;
+        let mut order: Vec<((i64, u32, Kind), TileRow)> = Vec::new();
+        for (part, Part { kind, level, .. }) in self.parts.iter().enumerate() {
+            let samples = match kind {
+                Kind::Height | Kind::Light => TILE,
+                Kind::Bounds => TILE * PATCH,
+                Kind::Check => TILE * TILE,
+                Kind::CheckBounds => continue,
+            };
+            for y in 0..self.parts[part].tiles().height {
+                let finished = (((y + 1) * samples) << level).min(rows);
+                order.push(((finished, *level, *kind), TileRow { part, y }));
+            }
+        }
+        order.sort_by_key(|(key, row)| (*key, row.y));
+        let last = self.parts.len() - 1;
+        let mut order: Vec<TileRow> = order.into_iter().map(|(_, row)| row).collect();
+        order.extend((0..self.parts[last].tiles().height).map(|y| TileRow { part: last, y }));
+        order
+    }
+}
+
+/// Where the check of a tile stands: a sample of a check part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Check {
+    /// Index of the check part.
+    pub part: usize,
+    /// Column of the sample.
+    pub x: i64,
+    /// Row of the sample.
+    pub y: i64,
+    /// Its channel.
+    pub channel: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_found_where_they_stand_and_their_grids_follow_the_rules() {
+        for (w, h, light) in [
+            (1, 1, true),
+            (1, 500, false),
+            (300, 700, true),
+            (1201, 1201, false),
+        ] {
+            let grid = Grid::new(w, h, [1.0, 1.0]);
+            let layout = Layout::new(&grid, light).unwrap();
+            for (index, part) in layout.parts().iter().enumerate() {
+                assert_eq!(layout.part(part.kind, part.level), index, "{part:?}");
+                assert!(part.channels().0.is_sorted());
+            }
+            let has_light = layout.parts().iter().any(|p| p.kind == Kind::Light);
+            assert_eq!(has_light, light);
+            assert_eq!(layout.parts().last().unwrap().name(), "check.bounds");
+        }
+    }
+
+    #[test]
+    fn every_row_stands_once_and_checks_stand_after_what_they_check() {
+        let layout = Layout::new(&Grid::new(3000, 5000, [1.0, 1.0]), true).unwrap();
+        let order = layout.order();
+        let rows: i64 = layout.parts().iter().map(|p| p.tiles().height).sum();
+        assert_eq!(order.len() as i64, rows);
+        let place = |part, y| order.iter().position(|r| r.part == part && r.y == y).unwrap();
+        for (index, part) in layout.parts().iter().enumerate() {
+            for y in 0..part.tiles().height {
+                if let Some(check) = layout.check_of(index, 0, y) {
+                    assert!(
+                        place(index, y) < place(check.part, check.y / TILE),
+                        "{part:?} row {y}"
+                    );
+                }
+                if part.kind == Kind::Height && y > 0 {
+                    assert!(place(index, y - 1) < place(index, y));
+                }
+            }
+        }
+        // The first row of tiles of level 1 follows the second of level 0.
+        let at = |l, y| place(layout.part(Kind::Height, l), y);
+        assert!(at(0, 1) < at(1, 0) && at(1, 0) < at(0, 2));
+    }
+
+    #[test]
+    fn grids_beyond_openexr_are_refused_without_counting_tiles_one_by_one() {
+        let layout = |w, h| Layout::new(&Grid::new(w, h, [1.0, 1.0]), true);
+        assert!(layout(1 << 20, 1 << 20).is_ok());
+        assert!(layout(1 << 30, 1).unwrap_err().contains("a side"));
+        assert!(
+            layout(MAX_SIDE, MAX_SIDE)
+                .unwrap_err()
+                .contains("more than OpenEXR")
+        );
+        assert!(layout(0, 4).is_err());
+    }
+}

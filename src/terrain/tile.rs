@@ -1,0 +1,131 @@
+//! The bytes of one tile: samples laid out as OpenEXR wants them, and their check.
+//!
+//! A decoded tile is row by row, in each row channel by channel. Samples are in the machine's own byte order,
+//! as the exr crate takes and gives them; files and checks are little-endian.
+
+use bytemuck::{Pod, bytes_of, pod_read_unaligned};
+
+use crate::grid::Rect;
+
+/// For each channel of a bounds part (alphabetical) the field of [`crate::levels::Bounds`] it holds.
+pub(super) const BOUNDS_FIELDS: [usize; 6] = [2, 1, 0, 5, 4, 3];
+/// For each channel of a light part the field of [`crate::levels::LightSample`] it holds.
+pub(super) const LIGHT_FIELDS: [usize; 2] = [1, 0];
+
+/// The CRC-32C of a decoded tile, over its little-endian bytes.
+pub(super) fn check(bytes: &[u8], sample_bytes: usize) -> u32 {
+    if cfg!(target_endian = "little") {
+        return crc32c::crc32c(bytes);
+    }
+    let swapped: Vec<u8> = bytes
+        .chunks_exact(sample_bytes)
+        .flat_map(|s| s.iter().rev().copied())
+        .collect();
+    crc32c::crc32c(&swapped)
+}
+
+/// Lays samples of `N` fields out as a tile `width` samples wide; channel c holds field `fields[c]`.
+pub(super) fn pack<T: Pod, const N: usize>(samples: &[[T; N]], width: usize, fields: [usize; N]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(size_of_val(samples));
+    for row in samples.chunks_exact(width) {
+        for field in fields {
+            for sample in row {
+                bytes.extend_from_slice(bytes_of(&sample[field]));
+            }
+        }
+    }
+    bytes
+}
+
+/// Copies what `tile` (its samples lie at `tile_rect`) has of `rect` into `out`, which holds `rect` row by row.
+pub(super) fn unpack<T: Pod, const N: usize>(
+    tile: &[u8],
+    tile_rect: Rect,
+    fields: [usize; N],
+    rect: Rect,
+    out: &mut [[T; N]],
+) {
+    let both = tile_rect.intersection(rect);
+    let size = size_of::<T>();
+    let plane = tile_rect.width() as usize * size;
+    let count = both.width() as usize;
+    for z in both.z0..both.z1 {
+        let row = (z - tile_rect.z0) as usize * plane * N + (both.x0 - tile_rect.x0) as usize * size;
+        let start = ((z - rect.z0) * rect.width() + both.x0 - rect.x0) as usize;
+        for (channel, field) in fields.into_iter().enumerate() {
+            let from = &tile[row + channel * plane..][..count * size];
+            for (sample, bytes) in out[start..start + count].iter_mut().zip(from.chunks_exact(size)) {
+                sample[field] = pod_read_unaligned(bytes);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::levels::{Bounds, LightSample};
+    use crate::terrain::layout::{Kind, Part};
+    use half::f16;
+
+    #[test]
+    fn rows_hold_one_channel_after_another_and_come_back() {
+        let samples: Vec<[u16; 2]> = (0..12).map(|i| [i, 100 + i]).collect();
+        let bytes = pack(&samples, 4, [1, 0]);
+        let values: Vec<u16> = bytes.chunks_exact(2).map(pod_read_unaligned).collect();
+        assert_eq!(values[..8], [100, 101, 102, 103, 0, 1, 2, 3]);
+        let tile_rect = Rect::new(10, 20, 14, 23);
+        let rect = Rect::new(8, 21, 13, 30);
+        let mut out = vec![[7u16; 2]; rect.area() as usize];
+        unpack(&bytes, tile_rect, [1, 0], rect, &mut out);
+        for (index, (x, z)) in rect.cells().enumerate() {
+            let want = match tile_rect.contains(x, z) {
+                true => samples[((z - 20) * 4 + x - 10) as usize],
+                false => [7; 2],
+            };
+            assert_eq!(out[index], want, "({x}, {z})");
+        }
+    }
+
+    #[test]
+    fn channels_hold_the_fields_of_their_names() {
+        let bounds = Bounds {
+            min: 1.0,
+            max: 2.0,
+            error: 3.0,
+            need_min: 4.0,
+            need_max: 5.0,
+            need_error: 6.0,
+        };
+        let part = |kind| Part {
+            kind,
+            level: 0,
+            size: crate::grid::Size { width: 1, height: 1 },
+        };
+        let bytes = pack::<f32, 6>(&[bytemuck::cast(bounds)], 1, BOUNDS_FIELDS);
+        let named = |name: &str| {
+            let at = part(Kind::Bounds)
+                .channels()
+                .0
+                .iter()
+                .position(|c| *c == name)
+                .unwrap();
+            pod_read_unaligned::<f32>(&bytes[4 * at..][..4])
+        };
+        let names = ["min", "max", "error", "need_min", "need_max", "need_error"];
+        assert_eq!(names.map(named), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        let light = LightSample {
+            sun: f16::from_f32(0.25),
+            sky: f16::from_f32(0.75),
+        };
+        let bytes = pack::<u16, 2>(&[bytemuck::cast(light)], 1, LIGHT_FIELDS);
+        assert_eq!(part(Kind::Light).channels().0, ["sky", "sun"]);
+        assert_eq!(bytes, [bytes_of(&light.sky), bytes_of(&light.sun)].concat());
+    }
+
+    #[test]
+    fn the_check_is_crc_32c() {
+        // The check value of CRC-32C: of the nine digits (Koopman 2002, and RFC 3720, appendix B.4).
+        assert_eq!(check(b"123456789", 1), 0xE306_9283);
+    }
+}

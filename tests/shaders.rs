@@ -1,0 +1,171 @@
+//! Shaders parse, validate, and agree with the structs that Rust mirrors; no device is needed.
+#![cfg(feature = "gpu")]
+
+use std::collections::HashSet;
+
+use clipscape::clipmap::{LevelConstants, ViewConstants};
+use clipscape::gpu::{SkyConstants, compose, entry_files};
+use clipscape::shade::ShadeConstants;
+
+fn source(name: &str) -> String {
+    compose("test.wgsl", &format!("#import {name}\n"))
+        .unwrap_or_else(|e| panic!("{e}"))
+        .source
+}
+
+fn parse(source: &str) -> naga::Module {
+    naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)))
+}
+
+fn validate(module: &naga::Module) -> Result<naga::valid::ModuleInfo, String> {
+    let mut validator = naga::valid::Validator::new(
+        naga::valid::ValidationFlags::all(),
+        naga::valid::Capabilities::empty(),
+    );
+    validator.validate(module).map_err(|e| format!("{e:?}"))
+}
+
+#[test]
+fn every_shader_validates_and_no_binding_is_used_twice() {
+    let files: Vec<_> = entry_files().collect();
+    assert!(files.contains(&"terrain.wgsl") && files.contains(&"sky.wgsl"));
+    for name in files {
+        let module = parse(&source(name));
+        validate(&module).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let mut used = HashSet::new();
+        for (_, variable) in module.global_variables.iter() {
+            if let Some(binding) = &variable.binding {
+                assert!(
+                    used.insert((binding.group, binding.binding)),
+                    "{name}: {binding:?} is used twice"
+                );
+            }
+        }
+        for entry in &module.entry_points {
+            assert!(
+                ["vertex", "fragment"].contains(&entry.name.as_str()),
+                "{name}: {}",
+                entry.name
+            );
+        }
+    }
+}
+
+#[test]
+fn control_an_invalid_shader_is_caught() {
+    let spoiled = source("terrain.wgsl").replace("return tone(radiance);", "return radiance.x;");
+    let caught = match naga::front::wgsl::parse_str(&spoiled) {
+        Ok(module) => validate(&module).is_err(),
+        Err(_) => true,
+    };
+    assert!(caught);
+}
+
+/// Names and offsets of a WGSL struct's members, and its span.
+fn layout(source: &str, name: &str) -> (Vec<(String, u32)>, u32) {
+    let module = parse(source);
+    let (_, ty) = module
+        .types
+        .iter()
+        .find(|(_, t)| t.name.as_deref() == Some(name))
+        .expect(name);
+    let naga::TypeInner::Struct { members, span } = &ty.inner else {
+        panic!("{name} is not a struct")
+    };
+    (
+        members
+            .iter()
+            .map(|m| (m.name.clone().unwrap(), m.offset))
+            .collect(),
+        *span,
+    )
+}
+
+macro_rules! our_layout {
+    ($t:ident { $($f:ident),* $(,)? }) => {
+        (
+            vec![$((stringify!($f).to_string(), std::mem::offset_of!($t, $f) as u32)),*],
+            size_of::<$t>() as u32,
+        )
+    };
+}
+
+#[test]
+fn mirrored_structs_have_the_layout_that_shaders_read() {
+    let terrain = source("terrain.wgsl");
+    let ours = our_layout!(ViewConstants {
+        clip_from_east,
+        clip_from_up,
+        clip_from_south,
+        anchor,
+        fraction,
+        spacing_m,
+        eye_height_m,
+        edge,
+        vertical_scale,
+        near_m,
+        reach,
+        transition,
+        slot_mask,
+        held_mask,
+    });
+    assert_eq!(ours, layout(&terrain, "ViewConstants"));
+    let ours = our_layout!(LevelConstants {
+        last,
+        slot_shift,
+        parent_last,
+        inverse_step,
+        climb,
+        light_at_eye,
+        light_scale,
+        has_coarser,
+    });
+    assert_eq!(ours, layout(&terrain, "LevelConstants"));
+    let ours = our_layout!(ShadeConstants {
+        to_sun,
+        low_m,
+        high_m,
+        base_m,
+        slope_scale
+    });
+    assert_eq!(ours, layout(&terrain, "ShadeConstants"));
+    let ours = our_layout!(SkyConstants { right, up, forward });
+    assert_eq!(ours, layout(&source("sky.wgsl"), "SkyConstants"));
+}
+
+#[test]
+fn control_swapped_fields_are_caught() {
+    let swapped = source("terrain.wgsl")
+        .replace("    near_m: f32, ", "    near_n: f32, ")
+        .replace("view.near_m", "view.near_n");
+    let ours = our_layout!(ViewConstants {
+        clip_from_east,
+        clip_from_up,
+        clip_from_south,
+        anchor,
+        fraction,
+        spacing_m,
+        eye_height_m,
+        edge,
+        vertical_scale,
+        near_m,
+        reach,
+        transition,
+        slot_mask,
+        held_mask,
+    });
+    assert_ne!(ours, layout(&swapped, "ViewConstants"));
+    let widened = source("terrain.wgsl").replace("    inverse_step: f32, ", "    inverse_step: vec2<f32>, ");
+    let module_layout = std::panic::catch_unwind(|| layout(&widened, "LevelConstants"));
+    let ours = our_layout!(LevelConstants {
+        last,
+        slot_shift,
+        parent_last,
+        inverse_step,
+        climb,
+        light_at_eye,
+        light_scale,
+        has_coarser,
+    });
+    assert!(module_layout.is_err() || module_layout.unwrap() != ours);
+}
