@@ -1,7 +1,6 @@
 //! What may be typed: commands, their options, and the help of each.
 
 #[cfg(feature = "gpu")]
-#[cfg_attr(not(test), expect(dead_code, reason = "the command joins `Command` together with its body"))]
 mod render;
 
 use std::path::PathBuf;
@@ -13,7 +12,12 @@ use crate::light::{DEFAULT_SKY_DIRECTIONS, Sun};
 
 /// A terrain geometry clipmap engine: from a DEM to frames, and how wrong they are.
 #[derive(Debug, Parser)]
-#[command(name = "clipscape", version, arg_required_else_help = true, max_term_width = 100)]
+#[command(
+    name = "clipscape",
+    version,
+    arg_required_else_help = true,
+    max_term_width = 100
+)]
 #[command(after_help = "Exit status: 0 done, 1 could not, 2 usage, 130 interrupted.")]
 pub(super) struct Cli {
     #[command(subcommand)]
@@ -67,7 +71,7 @@ pub(super) struct PreprocessArgs {
 
     /// Directions in which the sky is looked for; 0 leaves the terrain out of its share
     #[arg(long, value_name = "N", default_value_t = DEFAULT_SKY_DIRECTIONS)]
-    #[arg(value_parser = clap::value_parser!(u32).range(0..=3600))]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=3600), allow_negative_numbers = true)]
     pub(super) sky_directions: u32,
 
     /// Refuse a DEM that needs more memory than this, as in 512M or 2GiB
@@ -124,9 +128,16 @@ mod tests {
 
     #[test]
     fn values_may_be_negative() {
-        let Command::Preprocess(args) = parse("clipscape preprocess a.tif --sun -45,-2").unwrap().command else {
+        let Command::Preprocess(args) = parse("clipscape preprocess a.tif --sun -45,-2").unwrap().command
+        else {
             panic!("another command");
         };
-        assert_eq!(args.sun, Some(Sun { azimuth_deg: -45.0, altitude_deg: -2.0 }));
+        assert_eq!(
+            args.sun,
+            Some(Sun {
+                azimuth_deg: -45.0,
+                altitude_deg: -2.0
+            })
+        );
     }
 }

@@ -94,13 +94,29 @@ pub(super) fn run(args: &InfoArgs, progress: &dyn Progress) -> Outcome {
 }
 
 fn of_dem(source: &dyn HeightSource, all: bool, progress: &dyn Progress) -> Result<Info> {
-    let Description { grid, format, sample_type, place, assumed, name, .. } = source.description();
+    let Description {
+        grid,
+        format,
+        sample_type,
+        place,
+        assumed,
+        name,
+        ..
+    } = source.description();
     let heights = if all || grid.size.samples() <= CHEAP_SAMPLES {
         read_heights(name, grid, progress, |rect, out| source.read(rect, out))?
     } else {
         Heights::default()
     };
-    Ok(Info::new(grid, format, sample_type, place.as_ref(), heights, None, assumed))
+    Ok(Info::new(
+        grid,
+        format,
+        sample_type,
+        place.as_ref(),
+        heights,
+        None,
+        assumed,
+    ))
 }
 
 fn of_terrain(file: &TerrainFile, all: bool, progress: &dyn Progress) -> Result<Info> {
@@ -113,7 +129,15 @@ fn of_terrain(file: &TerrainFile, all: bool, progress: &dyn Progress) -> Result<
     } else {
         bounded_heights(file)?
     };
-    Ok(Info::new(grid, "terrain file", "float32", meta.place.as_ref(), heights, meta.light, &meta.assumed))
+    Ok(Info::new(
+        grid,
+        "terrain file",
+        "float32",
+        meta.place.as_ref(),
+        heights,
+        meta.light,
+        &meta.assumed,
+    ))
 }
 
 /// Reads all heights, band by band.
@@ -136,11 +160,18 @@ fn read_heights(
         let band = &mut band[..rect.area() as usize];
         read(rect, band)?;
         for &h in band.iter() {
-            if h.is_nan() { voids += 1 } else { widen(&mut range, h, h) }
+            if h.is_nan() {
+                voids += 1;
+            } else {
+                widen(&mut range, h, h);
+            }
         }
         progress.advance(rect.height() as u64);
     }
-    Ok(Heights { range, voids: Some(voids) })
+    Ok(Heights {
+        range,
+        voids: Some(voids),
+    })
 }
 
 /// The range from the bounds of level 0, a row of patches at a time; they do not tell voids.
@@ -150,8 +181,11 @@ fn bounded_heights(file: &TerrainFile) -> Result<Heights> {
     let mut range = None;
     for b in 0..patches.height {
         // As for heights: what is not there is an error.
-        file.bounds(0, Rect::new(0, b, patches.width, b + 1), &mut row).map(drop)?;
-        row.iter().filter(|bounds| !bounds.is_void()).for_each(|p| widen(&mut range, p.min, p.max));
+        file.bounds(0, Rect::new(0, b, patches.width, b + 1), &mut row)
+            .map(drop)?;
+        row.iter()
+            .filter(|bounds| !bounds.is_void())
+            .for_each(|p| widen(&mut range, p.min, p.max));
     }
     Ok(Heights { range, voids: None })
 }
@@ -207,20 +241,38 @@ fn text(name: &str, info: &Info, verified: bool) -> String {
         writeln!(text, "  {title:<9} {value}").expect("a text takes all that is written to it");
     };
     let [dx, dz] = info.spacing.map(short);
-    line("size", format!("{} x {} samples, {dx} x {dz} m apart", info.width, info.height));
+    line(
+        "size",
+        format!("{} x {} samples, {dx} x {dz} m apart", info.width, info.height),
+    );
     match (info.min, info.max, info.voids) {
         (Some(min), Some(max), _) => line("heights", format!("{} to {} m", short(min), short(max))),
         (_, _, Some(_)) => line("heights", "none: all samples are void".into()),
-        _ => line("heights", "not read: it is large (--verify reads all of it)".into()),
+        _ => line(
+            "heights",
+            "not read: it is large (--verify reads all of it)".into(),
+        ),
     }
     if let Some(voids) = info.voids {
-        line("voids", format!("{voids} of {} samples", info.width * info.height));
+        line(
+            "voids",
+            format!("{voids} of {} samples", info.width * info.height),
+        );
     }
     match (info.extent, info.origin) {
         (Some([west, south, east, north]), Some([x, y])) => {
             let crs = info.crs.as_deref().unwrap_or("unknown reference system");
             line("place", crs.into());
-            line("", format!("x {} to {}, y {} to {}", short(west), short(east), short(south), short(north)));
+            line(
+                "",
+                format!(
+                    "x {} to {}, y {} to {}",
+                    short(west),
+                    short(east),
+                    short(south),
+                    short(north)
+                ),
+            );
             let how = match info.registration {
                 Some(Registration::Area) => "pixels are areas",
                 _ => "pixels are points",
@@ -234,7 +286,10 @@ fn text(name: &str, info: &Info, verified: bool) -> String {
         Some(light) => {
             let [azimuth, altitude] = light.sun.map(short);
             let directions = light.sky_directions;
-            line("light", format!("sun at azimuth {azimuth}, altitude {altitude}; {directions} sky directions"));
+            line(
+                "light",
+                format!("sun at azimuth {azimuth}, altitude {altitude}; {directions} sky directions"),
+            );
         }
         None => line("light", "none".into()),
     }
@@ -253,9 +308,17 @@ fn short(value: f64) -> String {
     if magnitude != 0.0 && !(1e-6..1e12).contains(&magnitude) {
         return format!("{value:e}");
     }
-    let whole_digits = if magnitude < 1.0 { 0 } else { magnitude.log10() as usize + 1 };
+    let whole_digits = if magnitude < 1.0 {
+        0
+    } else {
+        magnitude.log10() as usize + 1
+    };
     let text = format!("{value:.*}", 8_usize.saturating_sub(whole_digits));
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').into()
+    } else {
+        text
+    }
 }
 
 #[cfg(test)]
@@ -282,7 +345,10 @@ mod tests {
 
     #[test]
     fn heights_are_gathered_over_bands_with_voids_apart() {
-        let grid = Grid { base_m: 1000.0, ..Grid::new(1500, 1500, [1.0, 1.0]) };
+        let grid = Grid {
+            base_m: 1000.0,
+            ..Grid::new(1500, 1500, [1.0, 1.0])
+        };
         let heights = read_heights("t", &grid, &Silent, |rect, out| {
             for ((x, z), h) in rect.cells().zip(out) {
                 *h = match (x, z) {
@@ -295,7 +361,13 @@ mod tests {
             Ok(())
         });
         let heights = heights.unwrap();
-        assert_eq!(heights, Heights { range: Some([-7.0, 9.0]), voids: Some(1500) });
+        assert_eq!(
+            heights,
+            Heights {
+                range: Some([-7.0, 9.0]),
+                voids: Some(1500)
+            }
+        );
         let info = Info::new(&grid, "test", "float32", None, heights, None, &[]);
         assert_eq!((info.min, info.max), (Some(993.0), Some(1009.0)));
     }

@@ -36,7 +36,10 @@ fn synth(path: &Path) -> Option<Result<Synth>> {
 pub(super) fn stamp(path: &Path) -> SourceStamp {
     let name = path.display().to_string();
     if synth(path).is_some() {
-        return SourceStamp { name, ..SourceStamp::default() };
+        return SourceStamp {
+            name,
+            ..SourceStamp::default()
+        };
     }
     let metadata = std::fs::metadata(path).ok();
     let modified = metadata.as_ref().and_then(|m| m.modified().ok());
@@ -51,11 +54,19 @@ pub(super) fn stamp(path: &Path) -> SourceStamp {
 /// The name of what is made of `path` and ends in `ending`: beside the input, in the current folder for terrain
 /// that is no file. `a/N42E001.hgt` gives `a/N42E001` and the ending; so does `a/N42E001.terrain.exr`.
 pub(super) fn beside(path: &Path, ending: &str) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let name = path
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
     let stem = match name.strip_suffix(".terrain.exr") {
         Some(stem) => stem.to_string(),
         None if synth(path).is_some() => name.replace(':', "-"),
-        None => Path::new(&name).file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        None => Path::new(&name)
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
     };
     path.with_file_name(stem + ending)
 }

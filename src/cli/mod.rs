@@ -10,7 +10,6 @@ mod progress;
 mod synth;
 mod values;
 #[cfg(feature = "gpu")]
-#[cfg_attr(not(test), expect(dead_code, reason = "the arguments of `render` are not parsed yet"))]
 mod view_values;
 
 use std::ffi::OsString;
@@ -77,7 +76,11 @@ fn status(outcome: Outcome) -> u8 {
         Err(Failure::Said) => FAILED_STATUS,
         Err(Failure::Error(error)) => {
             say(&error.to_string());
-            if error.kind() == ErrorKind::Cancelled { INTERRUPTED_STATUS } else { FAILED_STATUS }
+            if error.kind() == ErrorKind::Cancelled {
+                INTERRUPTED_STATUS
+            } else {
+                FAILED_STATUS
+            }
         }
     }
 }
@@ -103,17 +106,29 @@ fn usage_line(error: &clap::Error) -> String {
         return "no command is given; see clipscape --help".into();
     }
     let text = error.render().to_string();
-    let lines = text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage:"));
-    let what: Vec<&str> = lines.filter(|line| !line.is_empty() && !line.starts_with("tip:")).collect();
+    let lines = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:"));
+    let what: Vec<&str> = lines
+        .filter(|line| !line.is_empty() && !line.starts_with("tip:"))
+        .collect();
     let what = what.join(" ");
-    let what = what.strip_prefix("error: ").unwrap_or(&what).trim_end_matches("For more information, try '--help'.");
-    let near = [ContextKind::SuggestedArg, ContextKind::SuggestedSubcommand, ContextKind::SuggestedValue]
-        .iter()
-        .find_map(|kind| match error.get(*kind)? {
-            ContextValue::String(name) => Some(name.clone()),
-            ContextValue::Strings(names) => names.first().cloned(),
-            _ => None,
-        });
+    let what = what
+        .strip_prefix("error: ")
+        .unwrap_or(&what)
+        .trim_end_matches("For more information, try '--help'.");
+    let near = [
+        ContextKind::SuggestedArg,
+        ContextKind::SuggestedSubcommand,
+        ContextKind::SuggestedValue,
+    ]
+    .iter()
+    .find_map(|kind| match error.get(*kind)? {
+        ContextValue::String(name) => Some(name.clone()),
+        ContextValue::Strings(names) => names.first().cloned(),
+        _ => None,
+    });
     match near {
         Some(name) => format!("{}; did you mean {name}?", what.trim()),
         None => format!("{}; see --help", what.trim()),
@@ -132,9 +147,18 @@ mod tests {
     fn complaints_are_one_line_and_name_what_is_near() {
         for (line, says) in [
             ("clipscape", "no command is given; see clipscape --help"),
-            ("clipscape inof a.tif", "unrecognized subcommand 'inof'; did you mean info?"),
-            ("clipscape info --jsno a.tif", "unexpected argument '--jsno' found; did you mean --json?"),
-            ("clipscape info", "the following required arguments were not provided: <INPUT>; see --help"),
+            (
+                "clipscape inof a.tif",
+                "unrecognized subcommand 'inof'; did you mean info?",
+            ),
+            (
+                "clipscape info --jsno a.tif",
+                "unexpected argument '--jsno' found; did you mean --json?",
+            ),
+            (
+                "clipscape info",
+                "the following required arguments were not provided: <INPUT>; see --help",
+            ),
             (
                 "clipscape preprocess a.tif --sun 0,99",
                 "invalid value '0,99' for '--sun <AZIMUTH,ALTITUDE>': the altitude is outside of -90 to 90 degrees; \

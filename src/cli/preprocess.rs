@@ -2,10 +2,10 @@
 
 use std::io::Write;
 
+use super::Outcome;
 use super::args::PreprocessArgs;
 use super::input::{self, Input};
 use super::progress::Terminal;
-use super::Outcome;
 use crate::build::{self, Output, PreprocessOptions};
 use crate::error::{Error, ErrorKind};
 use crate::light::LightOptions;
@@ -20,7 +20,10 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
             return Err(error.advice("name the DEM that it was made of").into());
         }
     };
-    let out = args.output.clone().unwrap_or_else(|| input::beside(&args.input, ".terrain.exr"));
+    let out = args
+        .output
+        .clone()
+        .unwrap_or_else(|| input::beside(&args.input, ".terrain.exr"));
     let defaults = PreprocessOptions::default();
     let options = PreprocessOptions {
         light: (!args.no_light).then(|| LightOptions {
@@ -33,11 +36,16 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
         ..defaults
     };
     // Made first: where it cannot be, that is said before the work and not after it.
-    let stats = args.stats.as_deref().map(|path| Output::create(path, args.force)).transpose()?;
+    let stats = args
+        .stats
+        .as_deref()
+        .map(|path| Output::create(path, args.force))
+        .transpose()?;
     let report = build::preprocess(source.as_ref(), &out, &options, terminal)?;
     if let (Some((output, mut file)), Some(path)) = (stats, &args.stats) {
         let line = serde_json::to_string(&report).expect("numbers are valid JSON") + "\n";
-        file.write_all(line.as_bytes()).map_err(|e| Error::io(path.display(), e))?;
+        file.write_all(line.as_bytes())
+            .map_err(|e| Error::io(path.display(), e))?;
         output.publish(&file)?;
     }
     terminal.note(&format!("{} is made, in {:.1} s", out.display(), report.total_s));

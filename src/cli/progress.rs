@@ -40,7 +40,11 @@ pub(super) struct Terminal {
 
 impl Terminal {
     pub(super) fn new(quiet: bool) -> Self {
-        Self { quiet, draws: !quiet && std::io::stderr().is_terminal(), bar: Mutex::new(None) }
+        Self {
+            quiet,
+            draws: !quiet && std::io::stderr().is_terminal(),
+            bar: Mutex::new(None),
+        }
     }
 
     /// A line about what was done, for whoever is watching; not where quiet.
@@ -65,7 +69,9 @@ impl Progress for Terminal {
             let target = ProgressDrawTarget::stderr_with_hz(REDRAWS_PER_S);
             let next = ProgressBar::with_draw_target(Some(total), target).with_message(stage.to_string());
             let style = "{msg:>12} {wide_bar} {percent:>3} %  {per_sec}, {eta} left";
-            next.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
+            next.set_style(
+                ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()),
+            );
             *bar = Some(next);
         });
     }

@@ -31,6 +31,10 @@ fn refuse_other_formats(path: &Path) -> Result<()> {
     if ending.is_some_and(|e| e == "tif" || e == "tiff") {
         return Ok(());
     }
-    Err(Error::new(ErrorKind::Unsupported, path.display(), "a DEM is written as a GeoTIFF only")
-        .advice("name it .tif"))
+    Err(Error::new(
+        ErrorKind::Unsupported,
+        path.display(),
+        "a DEM is written as a GeoTIFF only",
+    )
+    .advice("name it .tif"))
 }

@@ -15,14 +15,20 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
 pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let values: Vec<f64> = text.split(',').map(number).collect::<Result<_, _>>()?;
     let count = values.len();
-    values.try_into().map_err(|_| format!("{count} numbers, {N} are wanted, with commas between them"))
+    values
+        .try_into()
+        .map_err(|_| format!("{count} numbers, {N} are wanted, with commas between them"))
 }
 
 /// A sun `AZIMUTH,ALTITUDE` in degrees.
 pub(super) fn sun(text: &str) -> Result<Sun, String> {
     let [azimuth_deg, altitude_deg] = numbers(text)?;
-    let sun = Sun { azimuth_deg, altitude_deg };
-    sun.check().map_err(|_| "the altitude is outside of -90 to 90 degrees".to_string())?;
+    let sun = Sun {
+        azimuth_deg,
+        altitude_deg,
+    };
+    sun.check()
+        .map_err(|_| "the altitude is outside of -90 to 90 degrees".to_string())?;
     Ok(sun)
 }
 
@@ -47,7 +53,9 @@ pub(super) fn bytes(text: &str) -> Result<u64, String> {
         (None, _) if matches!(unit.as_str(), "" | "b") => 1,
         _ => return Err(wanted()),
     };
-    number.checked_mul(factor).ok_or_else(|| "more bytes than can be counted".into())
+    number
+        .checked_mul(factor)
+        .ok_or_else(|| "more bytes than can be counted".into())
 }
 
 #[cfg(test)]
@@ -76,7 +84,13 @@ mod tests {
 
     #[test]
     fn suns_are_in_the_sky_or_refused() {
-        assert_eq!(sun("-45,-3"), Ok(Sun { azimuth_deg: -45.0, altitude_deg: -3.0 }));
+        assert_eq!(
+            sun("-45,-3"),
+            Ok(Sun {
+                azimuth_deg: -45.0,
+                altitude_deg: -3.0
+            })
+        );
         for bad in ["", "nan,0", "0,inf", "1,,3", "1,2,3", "x,y"] {
             assert!(sun(bad).is_err(), "{bad}");
         }

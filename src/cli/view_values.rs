@@ -13,19 +13,29 @@ pub(super) fn place(text: &str) -> Result<[f64; 3], String> {
 /// A pitch in degrees.
 pub(super) fn pitch(text: &str) -> Result<f64, String> {
     let pitch = number(text)?;
-    if pitch.abs() <= 90.0 { Ok(pitch) } else { Err("outside of -90 to 90 degrees".into()) }
+    if pitch.abs() <= 90.0 {
+        Ok(pitch)
+    } else {
+        Err("outside of -90 to 90 degrees".into())
+    }
 }
 
 /// A field of view in degrees.
 pub(super) fn fov(text: &str) -> Result<f64, String> {
     let fov = number(text)?;
-    if fov > 0.0 && fov < 180.0 { Ok(fov) } else { Err("not above 0 and below 180 degrees".into()) }
+    if fov > 0.0 && fov < 180.0 {
+        Ok(fov)
+    } else {
+        Err("not above 0 and below 180 degrees".into())
+    }
 }
 
 /// A picture's size `WIDTHxHEIGHT` in pixels, both above 0.
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     let side = |text: &str| text.parse::<u32>().ok().filter(|&n| n > 0);
-    let sides = text.split_once(['x', 'X']).and_then(|(width, height)| Some([side(width)?, side(height)?]));
+    let sides = text
+        .split_once(['x', 'X'])
+        .and_then(|(width, height)| Some([side(width)?, side(height)?]));
     sides.ok_or_else(|| "not WIDTHxHEIGHT in pixels, as in 1280x720".into())
 }
 
@@ -39,7 +49,10 @@ pub(super) fn frames(text: &str) -> Result<Range<u64>, String> {
 
 /// A clip size: a power of two from 64 to 2048.
 pub(super) fn clip_size(text: &str) -> Result<i64, String> {
-    let size = text.parse::<i64>().ok().filter(|n| (64..=2048).contains(n) && n & (n - 1) == 0);
+    let size = text
+        .parse::<i64>()
+        .ok()
+        .filter(|n| (64..=2048).contains(n) && n & (n - 1) == 0);
     size.ok_or_else(|| "not a power of two from 64 to 2048".into())
 }
 

@@ -83,11 +83,11 @@ pub(in crate::cli) struct ViewArgs {
     pub(in crate::cli) clip_size: i64,
 
     /// Keep only the finest levels, this many
-    #[arg(long, value_name = "L", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "L", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     pub(in crate::cli) levels: Option<u32>,
 
     /// Width of the morph band in steps of a level, 0 to N/4 - 10 [default: N/10]
-    #[arg(long, value_name = "T", value_parser = clap::value_parser!(i64).range(0..))]
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(i64).range(0..), allow_negative_numbers = true)]
     pub(in crate::cli) transition: Option<i64>,
 
     /// Factor on heights
@@ -139,10 +139,17 @@ mod tests {
     #[test]
     fn a_camera_is_what_was_typed() {
         let parse = |line: &str| Render::try_parse_from(line.split_whitespace()).map(|r| r.args);
-        let args = parse("render a.tif --eye -5,100,-3 --pitch -90 --heading -1e1 -z -2.5 --size 1x1").unwrap();
+        let args =
+            parse("render a.tif --eye -5,100,-3 --pitch -90 --heading -1e1 -z -2.5 --size 1x1").unwrap();
         assert_eq!(args.eye, Some([-5.0, 100.0, -3.0]));
-        assert_eq!((args.pitch, args.heading, args.view.vertical_scale), (Some(-90.0), Some(-10.0), -2.5));
-        assert_eq!((args.view.size, args.view.clip_size, args.view.msaa), ([1, 1], 256, 1));
+        assert_eq!(
+            (args.pitch, args.heading, args.view.vertical_scale),
+            (Some(-90.0), Some(-10.0), -2.5)
+        );
+        assert_eq!(
+            (args.view.size, args.view.clip_size, args.view.msaa),
+            ([1, 1], 256, 1)
+        );
         let args = parse("render a.exr --flight orbit --frames 0..3 --view level").unwrap();
         assert_eq!((args.frames, args.view.view), (Some(0..3), ViewMode::Level));
         for bad in [
