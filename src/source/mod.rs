@@ -1,9 +1,21 @@
 //! DEMs as their files give them: [`HeightSource`], one file per format, and procedural terrain.
 
+mod ascii_grid;
+mod file;
+mod geographic;
 mod georeference;
+#[cfg(feature = "dem")]
+mod geotiff;
+mod held;
+mod hgt;
+mod open;
+mod openexr;
+#[cfg(feature = "dem")]
+mod png;
 mod read_at;
 
 pub use georeference::{Georeference, Registration};
+pub use open::{open, open_bytes};
 pub use read_at::{Cursor, ReadAt};
 
 use crate::error::Result;
