@@ -13,10 +13,12 @@ mod openexr;
 #[cfg(feature = "dem")]
 mod png;
 mod read_at;
+mod synth;
 
 pub use georeference::{Georeference, Registration};
 pub use open::{open, open_bytes};
 pub use read_at::{Cursor, ReadAt};
+pub use synth::{MAX_SYNTH_SIZE, Synth};
 
 use crate::error::Result;
 use crate::grid::{Grid, Rect};
