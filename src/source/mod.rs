@@ -14,11 +14,15 @@ mod openexr;
 mod png;
 mod read_at;
 mod synth;
+#[cfg(feature = "dem")]
+mod write;
 
 pub use georeference::{Georeference, Registration};
 pub use open::{open, open_bytes};
 pub use read_at::{Cursor, ReadAt};
 pub use synth::{MAX_SYNTH_SIZE, Synth};
+#[cfg(feature = "dem")]
+pub use write::write_tiff;
 
 use crate::error::Result;
 use crate::grid::{Grid, Rect};
