@@ -63,7 +63,7 @@ fn any_flip_in_a_tile_is_caught_and_its_place_named() {
         let random = &mut Random::new(9);
         for round in 0..400 {
             let mut damaged = bytes.clone();
-            let at = start + random.below((bytes.len() - start) as u64) as usize;
+            let at = start + random.below((bytes.len() - start) as i64) as usize;
             damaged[at] ^= 1 << random.below(8);
             let case = format!("seed 9, round {round}, byte {at}, {look:?}");
             // A file whose last tile's head is damaged may not even open.
@@ -116,7 +116,7 @@ fn a_file_cut_anywhere_does_not_open() {
     let bytes = Arrays::random(300, 270, true, Look::Smooth, 11).file();
     assert!(open(bytes.clone()).is_ok());
     let random = &mut Random::new(12);
-    let some = (0..300).map(|_| random.below(bytes.len() as u64) as usize);
+    let some = (0..300).map(|_| random.below(bytes.len() as i64) as usize);
     for length in some.chain(0..64).chain(bytes.len() - 64..bytes.len()) {
         let error = open(bytes[..length].to_vec())
             .err()

@@ -10,32 +10,9 @@ use crate::error::Result;
 use crate::grid::{Grid, Rect, Size};
 use crate::levels::{Arrival, Bounds, Levels, LightSample};
 use crate::progress::Silent;
+pub(crate) use crate::pyramid::random::Random;
 use crate::source::{Georeference, Registration};
 use crate::work::Serial;
-
-/// A small seeded generator (xorshift64*, Vigna 2016).
-pub(crate) struct Random(u64);
-
-impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
-    }
-
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        self.0.wrapping_mul(0x2545_F491_4F6C_DD1D)
-    }
-
-    pub(crate) fn below(&mut self, n: u64) -> u64 {
-        (self.next() >> 33) % n
-    }
-
-    pub(crate) fn unit(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / (1u64 << 24) as f32
-    }
-}
 
 /// Levels held as arrays, with any content: the file must not care what the numbers mean.
 pub(crate) struct Arrays {
@@ -63,7 +40,7 @@ impl Arrays {
             let size = grid.level(l);
             let height = |(x, z): (i64, i64), random: &mut Random| match look {
                 Look::Smooth if random.below(5) == 0 => f32::NAN,
-                Look::Noise => Some(f32::from_bits(random.next() as u32))
+                Look::Noise => Some(f32::from_bits(random.bits() as u32))
                     .filter(|h| !h.is_nan())
                     .unwrap_or(0.0),
                 Look::Smooth => (x * 3 + z * 2) as f32,
@@ -74,13 +51,13 @@ impl Arrays {
         let bounds = (0..levels).map(|l| {
             let bounds = |random: &mut Random| match random.below(6) {
                 0 => Bounds::VOID,
-                _ => bytemuck::cast([0; 6].map(|_: u32| 1000.0 * random.unit())),
+                _ => bytemuck::cast([0; 6].map(|_: u32| 1000.0 * random.unit() as f32)),
             };
             (0..grid.patches(l).samples()).map(|_| bounds(random)).collect()
         });
         let bounds = bounds.collect();
         let light = light.then(|| {
-            let mut half = || f16::from_f32(random.unit());
+            let mut half = || f16::from_f64(random.unit());
             let mut all = |size: Size| -> Vec<LightSample> {
                 (0..size.samples())
                     .map(|_| LightSample {

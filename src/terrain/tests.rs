@@ -54,10 +54,7 @@ fn any_rectangle_is_the_same_part_of_the_whole_whatever_the_cache() {
             let level = random.below(4) as u32;
             let size = arrays.grid.level(level);
             let mut pick = |n: i64| {
-                let (a, b) = (
-                    random.below(n as u64 + 1) as i64,
-                    random.below(n as u64 + 1) as i64,
-                );
+                let (a, b) = (random.below(n + 1), random.below(n + 1));
                 (a.min(b), a.max(b))
             };
             let ((x0, x1), (z0, z1)) = (pick(size.width), pick(size.height));

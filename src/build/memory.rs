@@ -1,0 +1,97 @@
+//! How much memory a DEM takes while it is preprocessed, and how much the process took.
+
+use crate::error::{Error, ErrorKind, Result};
+use crate::grid::{Grid, Size};
+
+/// The ceiling unless another is given: 2 GiB.
+pub const DEFAULT_MEMORY_BYTES: u64 = 2 << 30;
+
+/// Bytes a sample of level 0 takes at the peak: heights of all levels and their bounds alone (measured at 4096 x
+/// 4096: 6.8), or light and what tracing and filtering it take as well (22.3).
+const BYTES_A_SAMPLE: u64 = 8;
+const BYTES_A_SAMPLE_WITH_LIGHT: u64 = 26;
+
+/// What does not depend on the DEM: the program, and tiles being compressed.
+const FIXED_BYTES: u64 = 64 << 20;
+
+/// The memory that preprocessing a DEM of `grid` takes, in bytes.
+pub fn needed_bytes(grid: &Grid, light: bool) -> u64 {
+    let a_sample = if light {
+        BYTES_A_SAMPLE_WITH_LIGHT
+    } else {
+        BYTES_A_SAMPLE
+    };
+    (grid.size.samples() as u64)
+        .saturating_mul(a_sample)
+        .saturating_add(FIXED_BYTES)
+}
+
+/// Refuses a DEM called `name` whose grid is impossible or that needs more than `ceiling_bytes`.
+pub(super) fn check(name: &str, grid: &Grid, light: bool, ceiling_bytes: u64) -> Result<()> {
+    grid.check()
+        .map_err(|what| Error::new(ErrorKind::Misuse, name, what))?;
+    let needed = needed_bytes(grid, light);
+    if needed <= ceiling_bytes {
+        return Ok(());
+    }
+    let Size { width, height } = grid.size;
+    let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+    let what = format!(
+        "{width} x {height} samples need {} MiB of memory, {} MiB are allowed",
+        mib(needed),
+        ceiling_bytes >> 20
+    );
+    let advice = format!("allow {} MiB, or cut the DEM", mib(needed));
+    Err(Error::new(ErrorKind::Limit, name, what).advice(advice))
+}
+
+/// The most memory that this process has held at once, in bytes, where the system tells (Linux).
+pub fn peak_rss_bytes() -> Option<u64> {
+    parse_peak(&std::fs::read_to_string("/proc/self/status").ok()?)
+}
+
+/// The line `VmHWM:    1234 kB` of `/proc/self/status` (proc(5)).
+fn parse_peak(status: &str) -> Option<u64> {
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kib.checked_mul(1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dem_above_the_ceiling_is_refused_with_the_number_it_needs() {
+        let grid = Grid::new(13201, 13201, [1.0, 1.0]);
+        let needed = needed_bytes(&grid, true);
+        assert!(check("a.tif", &grid, true, needed).is_ok());
+        let error = check("a.tif", &grid, true, needed - 1).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Limit);
+        assert!(
+            error
+                .to_string()
+                .contains(&format!("{} MiB", needed.div_ceil(1 << 20))),
+            "{error}"
+        );
+        assert!(needed_bytes(&grid, false) < needed);
+        let most = Grid::new(1 << 30, 1 << 30, [1.0, 1.0]);
+        assert_eq!(needed_bytes(&most, true), u64::MAX, "more than can be counted");
+        assert!(check("a.tif", &most, true, u64::MAX - 1).is_err());
+        let none = Grid::new(i64::MAX, i64::MAX, [1.0, 1.0]);
+        assert_eq!(
+            check("a.tif", &none, true, u64::MAX).unwrap_err().kind(),
+            ErrorKind::Misuse
+        );
+    }
+
+    #[test]
+    fn the_peak_is_read_where_the_system_tells() {
+        assert_eq!(
+            parse_peak("Name:\tx\nVmHWM:\t    1234 kB\nVmRSS:\t 1 kB\n"),
+            Some(1234 * 1024)
+        );
+        assert_eq!(parse_peak("VmRSS:\t 1 kB\n"), None);
+        assert_eq!(parse_peak("VmHWM:\t many kB\n"), None);
+    }
+}

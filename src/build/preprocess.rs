@@ -1,0 +1,404 @@
+//! The steps from a DEM to a terrain file: read, filter, bound, light, write.
+
+use std::io::BufWriter;
+use std::path::Path;
+use std::time::Instant;
+
+use super::memory::{self, DEFAULT_MEMORY_BYTES, peak_rss_bytes};
+use super::output::Output;
+use super::threads::Threads;
+use crate::error::{Error, ErrorKind, Result};
+use crate::grid::{Grid, Rect, Size};
+use crate::levels::LightSample;
+use crate::light::{LightOptions, light_levels, sky_share, sun_share};
+use crate::progress::Progress;
+use crate::pyramid::{DEFAULT_LOBES, Filter, MAX_LOBES, Pyramid};
+use crate::source::{Description, HeightSource};
+use crate::terrain::layout::Layout;
+use crate::terrain::{self, LightMeta, Meta, SourceStamp};
+use crate::work::Work;
+
+/// Rows that are read at once.
+const BAND_ROWS: i64 = 256;
+
+/// How to make a terrain file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PreprocessOptions {
+    /// The light to trace; none leaves it out of the file.
+    pub light: Option<LightOptions>,
+    /// Lobes a side of the filter, 1 to [`MAX_LOBES`].
+    pub lobes: u32,
+    /// Whether to replace a target that exists.
+    pub force: bool,
+    /// A DEM that needs more memory than this is refused.
+    pub memory_bytes: u64,
+    /// Threads to work on; 0 stands for one a processor. The file does not depend on it.
+    pub threads: usize,
+    /// The DEM's file. Without a name, the source's own.
+    pub source: SourceStamp,
+}
+
+impl Default for PreprocessOptions {
+    fn default() -> Self {
+        Self {
+            light: Some(LightOptions::default()),
+            lobes: DEFAULT_LOBES,
+            force: false,
+            memory_bytes: DEFAULT_MEMORY_BYTES,
+            threads: 0,
+            source: SourceStamp::default(),
+        }
+    }
+}
+
+/// What preprocessing took and cost.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct PreprocessReport {
+    /// Seconds to read the DEM.
+    pub read_s: f64,
+    /// Seconds to filter the heights into levels.
+    pub pyramid_s: f64,
+    /// Seconds for the bounds.
+    pub bounds_s: f64,
+    /// Seconds to trace the sun's share.
+    pub sun_s: f64,
+    /// Seconds to trace the sky's share, and to filter both into levels.
+    pub sky_s: f64,
+    /// Seconds to compress and write the file, and to have it on the disk.
+    pub write_s: f64,
+    /// Seconds in all.
+    pub total_s: f64,
+    /// Samples of the DEM.
+    pub samples: u64,
+    /// The most, in metres, by which a sample of a level above 0 leaves the range of level 0.
+    pub overshoot_m: f64,
+    /// Upper bound of what rounding the source's heights to f32 cost, in metres; 0 where none was rounded.
+    pub rounding_m: f64,
+    /// The most memory that the process has held at once, where the system tells.
+    pub peak_rss_bytes: Option<u64>,
+    /// Threads worked on.
+    pub threads: usize,
+}
+
+/// Makes the terrain file `out` of `source`.
+///
+/// The file is written beside `out` under another name and gets its own when it is whole; after an error or a
+/// cancellation nothing is left. The same input and options give the same bytes.
+///
+/// # Errors
+/// [`ErrorKind::Misuse`] where `out` exists and `force` is not set, is the source itself, or the options make
+/// no sense; [`ErrorKind::Limit`] where the DEM needs more memory than is allowed; [`ErrorKind::Cancelled`]; and
+/// what reading and writing meet.
+pub fn preprocess(
+    source: &dyn HeightSource,
+    out: &Path,
+    options: &PreprocessOptions,
+    progress: &dyn Progress,
+) -> Result<PreprocessReport> {
+    let description = source.description();
+    let stamp = match options.source.name.as_str() {
+        "" => SourceStamp {
+            name: description.name.clone(),
+            ..options.source.clone()
+        },
+        _ => options.source.clone(),
+    };
+    refuse_own_input(&stamp.name, out)?;
+    let filter = filter_of(options.lobes)?;
+    if let Some(light) = &options.light {
+        light.sun.check()?;
+    }
+    memory::check(
+        &description.name,
+        &description.grid,
+        options.light.is_some(),
+        options.memory_bytes,
+    )?;
+    Layout::new(&description.grid, options.light.is_some())
+        .map_err(|what| Error::new(ErrorKind::Limit, &description.name, what).advice("cut the DEM"))?;
+    let threads = Threads::new(options.threads)?;
+    let (output, file) = Output::create(out, options.force)?;
+
+    let steps = || {
+        let mut clock = Clock::start();
+        let mut report = PreprocessReport {
+            samples: description.grid.size.samples() as u64,
+            threads: threads.count(),
+            ..PreprocessReport::default()
+        };
+        let heights = read(source, progress)?;
+        report.rounding_m = rounding_m(description, &heights);
+        report.read_s = clock.lap();
+        let mut pyramid = Pyramid::new(
+            description.grid,
+            heights,
+            description.step_m,
+            &filter,
+            &threads,
+            progress,
+        )?;
+        report.overshoot_m = pyramid.overshoot_m().into();
+        report.pyramid_s = clock.lap();
+        pyramid.bound(&threads, progress)?;
+        report.bounds_s = clock.lap();
+        if let Some(light) = &options.light {
+            let levels = trace(
+                &pyramid,
+                &description.grid,
+                light,
+                &filter,
+                &threads,
+                progress,
+                |sun_s| {
+                    report.sun_s = sun_s;
+                },
+            )?;
+            pyramid.set_light(levels)?;
+            report.sky_s = (clock.lap() - report.sun_s).max(0.0);
+        }
+        let meta = describe(description, &pyramid, &filter, options, stamp);
+        let buffered = BufWriter::with_capacity(1 << 20, &file);
+        terrain::write(buffered, &meta, &pyramid, &threads, progress).map_err(|e| {
+            if e.subject() == "terrain file" {
+                e.about(out.display())
+            } else {
+                e
+            }
+        })?;
+        Ok((report, clock))
+    };
+    let result: Result<(PreprocessReport, Clock)> = steps();
+    let (mut report, mut clock) = match result {
+        Err(e) if e.kind() == ErrorKind::Cancelled => return Err(Error::cancelled(&description.name)),
+        other => other?,
+    };
+    output.publish(&file)?;
+    report.write_s = clock.lap();
+    report.total_s = clock.total();
+    report.peak_rss_bytes = peak_rss_bytes();
+    Ok(report)
+}
+
+/// Reads `source` whole and builds its pyramid with bounds, without light: what rendering a raw DEM needs.
+///
+/// # Errors
+/// [`ErrorKind::Misuse`] where there cannot be as many lobes; [`ErrorKind::Limit`] where it needs more than
+/// [`DEFAULT_MEMORY_BYTES`]; [`ErrorKind::Cancelled`]; and what reading meets.
+pub fn build_pyramid(source: &dyn HeightSource, lobes: u32, progress: &dyn Progress) -> Result<Pyramid> {
+    let description = source.description();
+    let filter = filter_of(lobes)?;
+    memory::check(&description.name, &description.grid, false, DEFAULT_MEMORY_BYTES)?;
+    let threads = Threads::new(0)?;
+    let heights = read(source, progress)?;
+    let mut pyramid = Pyramid::new(
+        description.grid,
+        heights,
+        description.step_m,
+        &filter,
+        &threads,
+        progress,
+    )?;
+    pyramid.bound(&threads, progress)?;
+    Ok(pyramid)
+}
+
+/// Time by laps.
+struct Clock {
+    start: Instant,
+    lap: Instant,
+}
+
+impl Clock {
+    fn start() -> Self {
+        let now = Instant::now();
+        Self { start: now, lap: now }
+    }
+
+    /// Seconds since the last lap.
+    fn lap(&mut self) -> f64 {
+        let now = Instant::now();
+        let lap = now - std::mem::replace(&mut self.lap, now);
+        lap.as_secs_f64()
+    }
+
+    fn total(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
+    }
+}
+
+fn filter_of(lobes: u32) -> Result<Filter> {
+    if (1..=MAX_LOBES).contains(&lobes) {
+        return Ok(Filter::sinc_blackman(lobes));
+    }
+    let what = format!("{lobes} lobes a side were asked for, 1 to {MAX_LOBES} are possible");
+    Err(Error::new(ErrorKind::Misuse, "filter", what))
+}
+
+/// Replacing a DEM by what was made of it would lose it.
+fn refuse_own_input(name: &str, out: &Path) -> Result<()> {
+    match (std::fs::canonicalize(name), std::fs::canonicalize(out)) {
+        (Ok(input), Ok(target)) if input == target => {
+            Err(
+                Error::new(ErrorKind::Misuse, out.display(), "is the input itself")
+                    .advice("choose another name"),
+            )
+        }
+        _ => Ok(()),
+    }
+}
+
+/// All heights of level 0, read in bands from north to south.
+fn read(source: &dyn HeightSource, progress: &dyn Progress) -> Result<Vec<f32>> {
+    let Description { grid, name, .. } = source.description();
+    grid.check()
+        .map_err(|what| Error::new(ErrorKind::Misuse, name, what))?;
+    let Size { width, height } = grid.size;
+    let count = grid.size.samples() as usize;
+    let mut heights = Vec::new();
+    heights.try_reserve_exact(count).map_err(|e| {
+        Error::new(
+            ErrorKind::Limit,
+            name,
+            format!("no memory for {width} x {height} samples"),
+        )
+        .because(e)
+    })?;
+    heights.resize(count, f32::NAN);
+    progress.begin("read", count as u64);
+    let bands = heights.chunks_mut((BAND_ROWS * width) as usize);
+    for (band, z) in bands.zip((0..height).step_by(BAND_ROWS as usize)) {
+        if progress.cancelled() {
+            return Err(Error::cancelled(name));
+        }
+        source.read(Rect::new(0, z, width, (z + BAND_ROWS).min(height)), band)?;
+        progress.advance(band.len() as u64);
+    }
+    Ok(heights)
+}
+
+/// Traces the light of all levels; `sun_done` hears the seconds that the sun took.
+fn trace(
+    pyramid: &Pyramid,
+    grid: &Grid,
+    options: &LightOptions,
+    filter: &Filter,
+    work: &dyn Work,
+    progress: &dyn Progress,
+    sun_done: impl FnOnce(f64),
+) -> Result<Vec<Vec<LightSample>>> {
+    let heights = pyramid.level(0);
+    let start = Instant::now();
+    let sun = sun_share(heights, grid, options.sun, work, progress)?;
+    sun_done(start.elapsed().as_secs_f64());
+    let sky = sky_share(heights, grid, options.sky_directions, work, progress)?;
+    light_levels(grid, heights, sun, sky, filter, work, progress)
+}
+
+/// Upper bound of what rounding heights to f32 cost, in metres: 0 where the source's own type and step show
+/// that f32 holds each of them, else half the spacing of f32 at the greatest.
+fn rounding_m(description: &Description, heights: &[f32]) -> f64 {
+    let most = heights
+        .iter()
+        .filter(|h| h.is_finite())
+        .fold(0f32, |most, h| most.max(h.abs()));
+    let as_metres = matches!(description.vertical_unit.as_str(), "metre" | "unknown");
+    let power_of_two = |step: f64| step.is_normal() && step.to_bits() << 12 == 0;
+    let exact = as_metres
+        && match description.step_m {
+            // Multiples of a power of two are exact up to 24 bits.
+            Some(step) => power_of_two(step) && f64::from(most) < step * f64::from(1u32 << 24),
+            None => matches!(description.sample_type.as_str(), "float16" | "float32"),
+        };
+    if exact {
+        return 0.0;
+    }
+    // Half of the distance to the next f32 above; what is rounded up to `most` is nearer than that.
+    (f64::from(most.next_up()) - f64::from(most)) / 2.0
+}
+
+fn describe(
+    description: &Description,
+    pyramid: &Pyramid,
+    filter: &Filter,
+    options: &PreprocessOptions,
+    source: SourceStamp,
+) -> Meta {
+    Meta {
+        grid: description.grid,
+        place: description.place.clone(),
+        vertical_unit: description.vertical_unit.clone(),
+        filter: filter.name().into(),
+        lobes: filter.lobes(),
+        rounding_step_m: pyramid.rounding_step_m(),
+        light: options.light.map(|light| LightMeta {
+            sun_azimuth_deg: light.sun.azimuth_deg,
+            sun_altitude_deg: light.sun.altitude_deg,
+            sky_directions: light.sky_directions,
+        }),
+        source,
+        tool: terrain::TOOL.into(),
+        assumed: description.assumed.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn described(sample_type: &str, step_m: Option<f64>, unit: &str) -> Description {
+        Description {
+            grid: Grid::new(1, 1, [1.0, 1.0]),
+            format: "test".into(),
+            sample_type: sample_type.into(),
+            step_m,
+            place: None,
+            vertical_unit: unit.into(),
+            assumed: Vec::new(),
+            name: "test".into(),
+        }
+    }
+
+    #[test]
+    fn rounding_is_0_only_where_f32_holds_every_height() {
+        let of = |sample_type, step, unit, heights: &[f32]| {
+            rounding_m(&described(sample_type, step, unit), heights)
+        };
+        assert_eq!(of("float32", None, "metre", &[0.1, f32::NAN]), 0.0);
+        assert_eq!(of("int16", Some(1.0), "unknown", &[-3.0, 2000.0]), 0.0);
+        assert_eq!(of("int16", Some(0.25), "metre", &[-3.0, 2000.25]), 0.0);
+        // 0.1 has no exact f32; 2000 lies among those that are 2^-13 apart.
+        assert_eq!(of("int16", Some(0.1), "metre", &[2000.0]), f64::powi(2.0, -14));
+        assert_eq!(of("float64", None, "metre", &[2000.0]), f64::powi(2.0, -14));
+        assert_eq!(of("float32", None, "foot", &[2000.0]), f64::powi(2.0, -14));
+        assert_eq!(of("int32", Some(1.0), "metre", &[16_777_216.0]), 1.0);
+        assert_eq!(of("int32", Some(1.0), "metre", &[16_777_215.0]), 0.0);
+        for (exact, stored) in [(1999.99999, 1999.99999f64 as f32), (0.3, 0.3f64 as f32)] {
+            let bound = of("float64", None, "metre", &[stored]);
+            assert!((f64::from(stored) - exact).abs() <= bound, "{exact}");
+        }
+    }
+
+    #[test]
+    fn the_report_has_the_names_of_the_statistics() {
+        let report = serde_json::to_value(PreprocessReport::default()).unwrap();
+        let mut names: Vec<&str> = report.as_object().unwrap().keys().map(String::as_str).collect();
+        names.sort_unstable();
+        let mut want = vec![
+            "read_s",
+            "pyramid_s",
+            "bounds_s",
+            "sun_s",
+            "sky_s",
+            "write_s",
+            "total_s",
+            "samples",
+            "overshoot_m",
+            "rounding_m",
+            "peak_rss_bytes",
+            "threads",
+        ];
+        want.sort_unstable();
+        assert_eq!(names, want);
+        assert!(report["peak_rss_bytes"].is_null());
+    }
+}
