@@ -7,8 +7,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// A temporary file beside its target. Dropped without [`Output::publish`], it is removed.
-pub(super) struct Output {
+/// A temporary file beside its target. Dropped without being published, it is removed.
+#[derive(Debug)]
+pub struct Output {
     target: PathBuf,
     temporary: PathBuf,
     force: bool,
@@ -16,7 +17,7 @@ pub(super) struct Output {
 
 impl Output {
     /// Creates the temporary file, open for writing. A target that exists is refused unless `force`.
-    pub(super) fn create(target: &Path, force: bool) -> Result<(Self, File)> {
+    pub fn create(target: &Path, force: bool) -> Result<(Self, File)> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         let Some(name) = target.file_name() else {
             let what = "names no file";
@@ -56,10 +57,32 @@ impl Output {
         ))
     }
 
+    /// What the file will be called.
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
     /// Syncs the file and gives it its name. Without `force` a target that has appeared meanwhile stays.
-    pub(super) fn publish(self, file: &File) -> Result<()> {
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] where the system refuses, [`ErrorKind::Misuse`] where the target has appeared; then the
+    /// target is as it was.
+    pub fn publish(self, file: &File) -> Result<()> {
+        file.sync_all().map_err(|e| Error::io(self.target.display(), e))?;
+        let folder = self.target.parent().map(Path::to_path_buf);
+        self.publish_unsynced()?;
+        // The name itself is safe once the folder is synced; where folders cannot be, nothing is lost.
+        let folder = folder.filter(|f| !f.as_os_str().is_empty()).unwrap_or_else(|| ".".into());
+        let _ = File::open(folder).and_then(|f| f.sync_all());
+        Ok(())
+    }
+
+    /// Gives the file its name without waiting for the disk: for what can be made again, hundreds of it.
+    ///
+    /// # Errors
+    /// As [`Output::publish`].
+    pub fn publish_unsynced(self) -> Result<()> {
         let refused = |e| Error::io(self.target.display(), e);
-        file.sync_all().map_err(refused)?;
         if self.force {
             fs::rename(&self.temporary, &self.target).map_err(refused)?;
         } else {
@@ -71,15 +94,6 @@ impl Output {
                 Err(_) if fs::symlink_metadata(&self.target).is_ok() => return Err(exists(&self.target)),
                 Err(_) => fs::rename(&self.temporary, &self.target).map_err(refused)?,
             }
-        }
-        // The name itself is safe once the folder is synced; where folders cannot be, nothing is lost.
-        if let Some(folder) = self.target.parent() {
-            let folder = if folder.as_os_str().is_empty() {
-                Path::new(".")
-            } else {
-                folder
-            };
-            let _ = File::open(folder).and_then(|f| f.sync_all());
         }
         Ok(())
     }

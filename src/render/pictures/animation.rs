@@ -5,9 +5,9 @@
 use std::fs::File;
 use std::path::Path;
 
-use super::partial::Partial;
 use super::shrink::{fitted, shrunk};
 use super::{check_frame, encoding_error};
+use crate::build::Output;
 use crate::error::{Error, ErrorKind, Result};
 
 /// The greatest width and height of the animation, pixels.
@@ -15,9 +15,9 @@ const MOST_PX: u32 = 480;
 
 /// An animation that is being written; without [`Animation::finish`] nothing is left of it.
 pub struct Animation {
-    // Before the partial file, so that the handle is closed when that is renamed or removed.
+    // Before the output, so that the handle is closed when that is renamed or removed.
     writer: png::Writer<File>,
-    partial: Partial,
+    output: Output,
     frame: (u32, u32),
     small: (u32, u32),
     frames_left: u32,
@@ -44,7 +44,7 @@ impl Animation {
                 "{fps} frames a second are not above 0 and finite"
             )));
         }
-        let (partial, file) = Partial::create(path)?;
+        let (output, file) = Output::create(path, true)?;
         let small = fitted(width, height, MOST_PX, MOST_PX);
         let (numerator, denominator) = delay_s(fps);
         let mut encoder = png::Encoder::new(file, small.0, small.1);
@@ -60,7 +60,7 @@ impl Animation {
         let writer = started.map_err(|e| encoding_error(path, e))?;
         Ok(Self {
             writer,
-            partial,
+            output,
             frame: (width, height),
             small,
             frames_left: frame_count,
@@ -74,19 +74,19 @@ impl Animation {
     /// cannot be written.
     pub fn add(&mut self, rgba8: &[u8]) -> Result<()> {
         let (width, height) = self.frame;
-        check_frame(self.partial.target(), width, height, rgba8)?;
+        check_frame(self.output.target(), width, height, rgba8)?;
         if self.frames_left == 0 {
             let what = "the animation has all the frames that were announced";
             return Err(Error::new(
                 ErrorKind::Misuse,
-                self.partial.target().display(),
+                self.output.target().display(),
                 what,
             ));
         }
         let small = shrunk(rgba8, width, height, self.small.0, self.small.1);
         self.writer
             .write_image_data(&small)
-            .map_err(|e| encoding_error(self.partial.target(), e))?;
+            .map_err(|e| encoding_error(self.output.target(), e))?;
         self.frames_left -= 1;
         Ok(())
     }
@@ -99,16 +99,16 @@ impl Animation {
     pub fn finish(self) -> Result<()> {
         let Self {
             writer,
-            partial,
+            output,
             frames_left,
             ..
         } = self;
         if frames_left > 0 {
             let what = format!("the animation lacks {frames_left} of its frames");
-            return Err(Error::new(ErrorKind::Misuse, partial.target().display(), what));
+            return Err(Error::new(ErrorKind::Misuse, output.target().display(), what));
         }
-        writer.finish().map_err(|e| encoding_error(partial.target(), e))?;
-        partial.finish()
+        writer.finish().map_err(|e| encoding_error(output.target(), e))?;
+        output.publish_unsynced()
     }
 }
 

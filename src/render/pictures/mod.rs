@@ -5,7 +5,6 @@
 
 mod animation;
 mod contact_sheet;
-mod partial;
 mod shrink;
 mod still;
 

@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::partial::Partial;
 use super::{check_frame, encoding_error};
+use crate::build::Output;
 use crate::error::{Error, Result};
 
 /// Writes a frame of `width` x `height` RGBA pixels as a PNG, replacing what is there.
@@ -29,7 +29,7 @@ pub(super) fn write_rgb(
     rgb: &[u8],
     compression: png::Compression,
 ) -> Result<()> {
-    let (partial, mut file) = Partial::create(path)?;
+    let (output, mut file) = Output::create(path, true)?;
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
@@ -43,7 +43,7 @@ pub(super) fn write_rgb(
     packed.map_err(|e| encoding_error(path, e))?;
     file.write_all(&bytes).map_err(|e| Error::io(path.display(), e))?;
     drop(file);
-    partial.finish()
+    output.publish_unsynced()
 }
 
 #[cfg(test)]
