@@ -56,6 +56,9 @@ pub mod gpu;
 #[cfg(feature = "gpu")]
 pub mod render;
 
+#[cfg(feature = "cli")]
+pub mod cli;
+
 pub use camera::{Camera, Flight, View};
 pub use clipmap::{Clipmap, ClipmapOptions};
 pub use error::{Error, ErrorKind, Result};

@@ -17,6 +17,10 @@ pub struct Output {
 
 impl Output {
     /// Creates the temporary file, open for writing. A target that exists is refused unless `force`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] where the target exists or names no file, [`ErrorKind::Io`] where its folder is missing
+    /// or may not be written to.
     pub fn create(target: &Path, force: bool) -> Result<(Self, File)> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         let Some(name) = target.file_name() else {

@@ -36,57 +36,58 @@ const FILL: f64 = 0.94;
 /// shown as if it were two samples wide.
 pub fn overview(grid: &Grid, min_m: f64, max_m: f64, aspect: f64) -> Camera {
     let (low, high) = ground_box(grid, min_m, max_m);
-    let middle = (low + high) / 2.0;
-    let camera = looking(middle, 0.0, OVERVIEW_PITCH_DEG);
-    let axes = camera.axes();
-    let (across, along) = tangents(aspect);
-    // Least values of b in `e.r - across e.f >= b` and of its three siblings, relative to the middle.
-    let mut bounds = [f64::NEG_INFINITY; 4];
-    for corner in corners(low, high) {
-        let [right, up, forward] = seen(axes, corner - middle);
-        let here = [
-            right - across * forward,
-            -right - across * forward,
-            up - along * forward,
-            -up - along * forward,
-        ];
-        bounds = std::array::from_fn(|k| bounds[k].max(here[k]));
-    }
-    let [east, west, above, below] = bounds;
-    let back = ((east + west) / (2.0 * across)).max((above + below) / (2.0 * along));
-    let offset = DVec3::new((east - west) / 2.0, (above - below) / 2.0, -back);
+    let camera = looking((low + high) / 2.0, 0.0, OVERVIEW_PITCH_DEG);
+    let offset = closest([camera], low, high, aspect);
     Camera {
-        eye: middle + axes * offset,
+        eye: camera.eye + camera.axes() * offset,
         ..camera
     }
 }
 
 impl Flight {
-    /// A circle around the DEM in 120 frames at 30 frames a second, looking at its middle, with the whole DEM
-    /// in every frame of pictures at least 4 : 3 wide. After the last frame comes the first again.
+    /// A circle around the DEM in 120 frames at 30 frames a second, looking at the vertical through its middle,
+    /// with the whole DEM in every frame of pictures at least 4 : 3 wide. After the last frame comes the first
+    /// again.
     ///
     /// It begins in the south and turns eastwards. Heights as in [`overview`].
     pub fn orbit(grid: &Grid, min_m: f64, max_m: f64) -> Self {
         let (low, high) = ground_box(grid, min_m, max_m);
-        let middle = (low + high) / 2.0;
-        let (across, along) = tangents(ORBIT_ASPECT);
-        let heading_deg = |k: u32| -360.0 * f64::from(k) / f64::from(ORBIT_FRAMES);
-        let mut distance_m = 0.0_f64;
-        for k in 0..ORBIT_FRAMES {
-            let axes = looking(middle, heading_deg(k), ORBIT_PITCH_DEG).axes();
-            for corner in corners(low, high) {
-                let [right, up, forward] = seen(axes, corner - middle);
-                let needed = (right.abs() / across).max(up.abs() / along) - forward;
-                distance_m = distance_m.max(needed);
-            }
-        }
-        let keys = (0..ORBIT_FRAMES).map(|k| {
-            let camera = looking(middle, heading_deg(k).rem_euclid(360.0), ORBIT_PITCH_DEG);
-            let eye = middle - camera.axes().col(2) * distance_m;
+        let cameras = (0..ORBIT_FRAMES).map(|k| {
+            let heading_deg = 360.0 - 360.0 * f64::from(k) / f64::from(ORBIT_FRAMES);
+            looking((low + high) / 2.0, heading_deg.rem_euclid(360.0), ORBIT_PITCH_DEG)
+        });
+        // One place behind the middle and above the line of sight, the same for all headings: a circle.
+        let offset = closest(cameras.clone(), low, high, ORBIT_ASPECT).with_x(0.0);
+        let keys = cameras.zip(0..).map(|(camera, k)| {
+            let eye = camera.eye + camera.axes() * offset;
             Key::new(f64::from(k) / ORBIT_FPS, &Camera { eye, ..camera })
         });
         Self::new(ORBIT_FPS, keys.collect()).expect("times rise and the box is finite")
     }
+}
+
+/// How far right, up and forward cameras that stand in the middle of the box must move, all alike, to be as
+/// close as they may with the whole box in their frames.
+fn closest(cameras: impl IntoIterator<Item = Camera>, low: DVec3, high: DVec3, aspect: f64) -> DVec3 {
+    let along = (FOV_DEG / 2.0).to_radians().tan() * FILL;
+    let across = along * aspect;
+    // Least values of b in `e.r - across e.f >= b` and of its three siblings, relative to the middle.
+    let mut bounds = [f64::NEG_INFINITY; 4];
+    for camera in cameras {
+        for corner in corners(low, high) {
+            let [right, up, forward] = seen(camera.axes(), corner - camera.eye);
+            let here = [
+                right - across * forward,
+                -right - across * forward,
+                up - along * forward,
+                -up - along * forward,
+            ];
+            bounds = std::array::from_fn(|k| bounds[k].max(here[k]));
+        }
+    }
+    let [east, west, above, below] = bounds;
+    let back = ((east + west) / (2.0 * across)).max((above + below) / (2.0 * along));
+    DVec3::new((east - west) / 2.0, (above - below) / 2.0, -back)
 }
 
 fn looking(eye: DVec3, heading_deg: f64, pitch_deg: f64) -> Camera {
@@ -97,12 +98,6 @@ fn looking(eye: DVec3, heading_deg: f64, pitch_deg: f64) -> Camera {
         roll_deg: 0.0,
         fov_deg: FOV_DEG,
     }
-}
-
-/// Tangents of half the horizontal and vertical fields of view, less the margin.
-fn tangents(aspect: f64) -> (f64, f64) {
-    let along = (FOV_DEG / 2.0).to_radians().tan() * FILL;
-    (along * aspect, along)
 }
 
 /// The DEM's box; never a point, so that there is a distance from which to see it.
@@ -239,14 +234,14 @@ mod tests {
                     );
                     widest = widest.max(filled);
                     let middle = (low + high) / 2.0;
-                    let [right, up, forward] = seen(camera.axes(), middle - camera.eye);
+                    let [right, _, forward] = seen(camera.axes(), middle - camera.eye);
                     assert!(
-                        right.hypot(up) < 1e-6 * forward,
+                        right.abs() < 1e-6 * forward,
                         "frame {k}: the middle is off the centre"
                     );
                 }
                 assert!(
-                    widest >= 0.6,
+                    widest >= 0.7,
                     "{width} x {height}, aspect {aspect}: fills only {widest}"
                 );
             }

@@ -1,0 +1,143 @@
+//! What may be typed: commands, their options, and the help of each.
+
+#[cfg(feature = "gpu")]
+mod render;
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+use super::values;
+use crate::light::{DEFAULT_SKY_DIRECTIONS, Sun};
+
+/// A terrain geometry clipmap engine: from a DEM to frames, and how wrong they are.
+#[derive(Debug, Parser)]
+#[command(
+    name = "clipscape",
+    version,
+    arg_required_else_help = true,
+    max_term_width = 100
+)]
+#[command(after_help = "Exit status: 0 done, 1 could not, 2 usage, 130 interrupted.")]
+pub(super) struct Cli {
+    #[command(subcommand)]
+    pub(super) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    Info(InfoArgs),
+    Preprocess(PreprocessArgs),
+    #[cfg(feature = "dem")]
+    Synth(SynthArgs),
+}
+
+/// Say what a DEM or terrain file is, and what was assumed of it.
+#[derive(Debug, Args)]
+pub(super) struct InfoArgs {
+    /// A DEM, a terrain file, or synth:SIZE[:SEED]
+    pub(super) input: PathBuf,
+
+    /// Print one JSON object
+    #[arg(long)]
+    pub(super) json: bool,
+
+    /// Read and check all of it, every tile
+    #[arg(long)]
+    pub(super) verify: bool,
+
+    /// Show no progress and no warnings
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+}
+
+/// Make a terrain file of a DEM: all its levels, their bounds, and light.
+#[derive(Debug, Args)]
+pub(super) struct PreprocessArgs {
+    /// A DEM, or synth:SIZE[:SEED]
+    pub(super) input: PathBuf,
+
+    /// The terrain file [default: STEM.terrain.exr beside the input]
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: Option<PathBuf>,
+
+    /// Trace no light
+    #[arg(long, conflicts_with_all = ["sun", "sky_directions"])]
+    pub(super) no_light: bool,
+
+    /// Where the sun stands: degrees clockwise from north, and above the horizon [default: 315,45]
+    #[arg(long, value_name = "AZIMUTH,ALTITUDE", value_parser = values::sun, allow_hyphen_values = true)]
+    pub(super) sun: Option<Sun>,
+
+    /// Directions in which the sky is looked for; 0 leaves the terrain out of its share
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_SKY_DIRECTIONS)]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=3600), allow_negative_numbers = true)]
+    pub(super) sky_directions: u32,
+
+    /// Refuse a DEM that needs more memory than this, as in 512M or 2GiB
+    #[arg(long, value_name = "BYTES", value_parser = values::bytes)]
+    pub(super) memory: Option<u64>,
+
+    /// Write how long it took, and what it cost, as a line of JSON
+    #[arg(long, value_name = "FILE")]
+    pub(super) stats: Option<PathBuf>,
+
+    /// Replace what exists
+    #[arg(long, short)]
+    pub(super) force: bool,
+
+    /// Show no progress and no warnings
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+}
+
+/// Write a procedural DEM of fractal mountains as a GeoTIFF.
+#[cfg(feature = "dem")]
+#[derive(Debug, Args)]
+pub(super) struct SynthArgs {
+    /// Samples along a side and, after a colon, the seed
+    #[arg(value_name = "SIZE[:SEED]")]
+    pub(super) size: String,
+
+    /// The GeoTIFF
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: PathBuf,
+
+    /// Replace what exists
+    #[arg(long, short)]
+    pub(super) force: bool,
+
+    /// Show no progress and no warnings
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn parse(line: &str) -> Result<Cli, clap::Error> {
+        Cli::try_parse_from(line.split_whitespace())
+    }
+
+    #[test]
+    fn the_definitions_agree_with_each_other() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn values_may_be_negative() {
+        let Command::Preprocess(args) = parse("clipscape preprocess a.tif --sun -45,-2").unwrap().command
+        else {
+            panic!("another command");
+        };
+        assert_eq!(
+            args.sun,
+            Some(Sun {
+                azimuth_deg: -45.0,
+                altitude_deg: -2.0
+            })
+        );
+    }
+}

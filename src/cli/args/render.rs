@@ -1,0 +1,166 @@
+//! What may be typed after `render`, and the options on how terrain is shown.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::cli::{values, view_values};
+use crate::light::Sun;
+use crate::shade::ViewMode;
+
+/// Draw pictures of a DEM or terrain file: one that shows the whole, one from a given place, or a flight.
+#[derive(Debug, Args)]
+pub(in crate::cli) struct RenderArgs {
+    /// A terrain file, a DEM (its pyramid is built on the way, no light traced), or synth:SIZE[:SEED]
+    pub(in crate::cli) input: PathBuf,
+
+    /// The picture, or the folder of a flight's frames [default: STEM.png, or STEM for a flight]
+    #[arg(long, short, value_name = "PATH")]
+    pub(in crate::cli) output: Option<PathBuf>,
+
+    /// Where the camera stands: world metres, x east, y up, z south of the north-western sample
+    #[arg(long, value_name = "X,Y,Z", value_parser = view_values::place, allow_hyphen_values = true)]
+    #[arg(conflicts_with = "flight")]
+    pub(in crate::cli) eye: Option<[f64; 3]>,
+
+    /// Where it looks: degrees clockwise from north [default: 0]
+    #[arg(long, value_name = "DEGREES", value_parser = values::number, allow_negative_numbers = true)]
+    #[arg(requires = "eye")]
+    pub(in crate::cli) heading: Option<f64>,
+
+    /// Degrees upwards, -90 to 90 [default: 0]
+    #[arg(long, value_name = "DEGREES", value_parser = view_values::pitch, allow_negative_numbers = true)]
+    #[arg(requires = "eye")]
+    pub(in crate::cli) pitch: Option<f64>,
+
+    /// Degrees by which the right side is tilted down [default: 0]
+    #[arg(long, value_name = "DEGREES", value_parser = values::number, allow_negative_numbers = true)]
+    #[arg(requires = "eye")]
+    pub(in crate::cli) roll: Option<f64>,
+
+    /// Vertical field of view in degrees [default: 60]
+    #[arg(long, value_name = "DEGREES", value_parser = view_values::fov, requires = "eye")]
+    pub(in crate::cli) fov: Option<f64>,
+
+    /// Draw the frames of a flight: a JSON file, or orbit to circle the DEM once
+    #[arg(long, value_name = "FILE|orbit")]
+    pub(in crate::cli) flight: Option<PathBuf>,
+
+    /// Only these frames of the flight, the last one excluded
+    #[arg(long, value_name = "A..B", value_parser = view_values::frames, requires = "flight")]
+    pub(in crate::cli) frames: Option<Range<u64>>,
+
+    /// Write the flight as an animated PNG too
+    #[arg(long, value_name = "FILE", requires = "flight")]
+    pub(in crate::cli) animation: Option<PathBuf>,
+
+    /// Write a sheet of up to 25 small frames of the flight too
+    #[arg(long, value_name = "FILE", requires = "flight")]
+    pub(in crate::cli) contact_sheet: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(in crate::cli) view: ViewArgs,
+
+    /// Replace what exists
+    #[arg(long, short)]
+    pub(in crate::cli) force: bool,
+
+    /// Show no progress and no warnings
+    #[arg(long, short)]
+    pub(in crate::cli) quiet: bool,
+}
+
+/// How terrain is shown, wherever it is.
+#[derive(Debug, Args)]
+pub(in crate::cli) struct ViewArgs {
+    /// Pixels of a frame
+    #[arg(long, value_name = "WxH", value_parser = view_values::size, default_value = "1280x720")]
+    pub(in crate::cli) size: [u32; 2],
+
+    /// Samples along the side of a level's window, a power of two from 64 to 2048
+    #[arg(long, value_name = "N", value_parser = view_values::clip_size, default_value = "256")]
+    pub(in crate::cli) clip_size: i64,
+
+    /// Keep only the finest levels, this many
+    #[arg(long, value_name = "L", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
+    pub(in crate::cli) levels: Option<u32>,
+
+    /// Width of the morph band in steps of a level, 0 to N/4 - 10 [default: N/10]
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(i64).range(0..), allow_negative_numbers = true)]
+    pub(in crate::cli) transition: Option<i64>,
+
+    /// Factor on heights
+    #[arg(long, short = 'z', value_name = "S", value_parser = values::number, default_value = "1")]
+    #[arg(allow_negative_numbers = true)]
+    pub(in crate::cli) vertical_scale: f64,
+
+    /// Where the sun stands, for terrain without traced light: degrees from north, and above the horizon
+    /// [default: 315,45]
+    #[arg(long, value_name = "AZIMUTH,ALTITUDE", value_parser = values::sun, allow_hyphen_values = true)]
+    pub(in crate::cli) sun: Option<Sun>,
+
+    /// What is shown: shaded, light, or level
+    #[arg(long, value_name = "VIEW", value_parser = view_values::view, default_value = "shaded")]
+    pub(in crate::cli) view: ViewMode,
+
+    /// Samples a pixel: 1 or 4
+    #[arg(long, value_name = "N", value_parser = view_values::msaa, default_value = "1")]
+    pub(in crate::cli) msaa: u32,
+
+    /// Leave the ground grey
+    #[arg(long)]
+    pub(in crate::cli) no_tint: bool,
+
+    /// No air between the ground and the eye
+    #[arg(long)]
+    pub(in crate::cli) no_haze: bool,
+
+    /// Draw patches that are not seen too; the picture is the same
+    #[arg(long)]
+    pub(in crate::cli) no_cull: bool,
+
+    /// Write a line of JSON for each frame and a summary
+    #[arg(long, value_name = "FILE")]
+    pub(in crate::cli) stats: Option<PathBuf>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Debug, Parser)]
+    struct Render {
+        #[command(flatten)]
+        args: RenderArgs,
+    }
+
+    #[test]
+    fn a_camera_is_what_was_typed() {
+        let parse = |line: &str| Render::try_parse_from(line.split_whitespace()).map(|r| r.args);
+        let args =
+            parse("render a.tif --eye -5,100,-3 --pitch -90 --heading -1e1 -z -2.5 --size 1x1").unwrap();
+        assert_eq!(args.eye, Some([-5.0, 100.0, -3.0]));
+        assert_eq!(
+            (args.pitch, args.heading, args.view.vertical_scale),
+            (Some(-90.0), Some(-10.0), -2.5)
+        );
+        assert_eq!(
+            (args.view.size, args.view.clip_size, args.view.msaa),
+            ([1, 1], 256, 1)
+        );
+        let args = parse("render a.exr --flight orbit --frames 0..3 --view level").unwrap();
+        assert_eq!((args.frames, args.view.view), (Some(0..3), ViewMode::Level));
+        for bad in [
+            "render a.tif --frames 0..3",
+            "render a.tif --pitch 3",
+            "render a.tif --eye 0,0,0 --flight orbit",
+            "render a.tif --msaa 2",
+            "render a.tif --levels 0",
+            "render a.tif --eye 0,nan,0",
+        ] {
+            assert!(parse(bad).is_err(), "{bad}");
+        }
+    }
+}

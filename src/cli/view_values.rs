@@ -1,0 +1,119 @@
+//! How a camera, a picture's size and the way of showing terrain are written.
+
+use std::ops::Range;
+
+use super::values::{number, numbers};
+use crate::shade::ViewMode;
+
+/// A place `X,Y,Z` in world metres.
+pub(super) fn place(text: &str) -> Result<[f64; 3], String> {
+    numbers(text)
+}
+
+/// A pitch in degrees.
+pub(super) fn pitch(text: &str) -> Result<f64, String> {
+    let pitch = number(text)?;
+    if pitch.abs() <= 90.0 {
+        Ok(pitch)
+    } else {
+        Err("outside of -90 to 90 degrees".into())
+    }
+}
+
+/// A field of view in degrees.
+pub(super) fn fov(text: &str) -> Result<f64, String> {
+    let fov = number(text)?;
+    if fov > 0.0 && fov < 180.0 {
+        Ok(fov)
+    } else {
+        Err("not above 0 and below 180 degrees".into())
+    }
+}
+
+/// A picture's size `WIDTHxHEIGHT` in pixels, both above 0.
+pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
+    let side = |text: &str| text.parse::<u32>().ok().filter(|&n| n > 0);
+    let sides = text
+        .split_once(['x', 'X'])
+        .and_then(|(width, height)| Some([side(width)?, side(height)?]));
+    sides.ok_or_else(|| "not WIDTHxHEIGHT in pixels, as in 1280x720".into())
+}
+
+/// Frames `A..B`: from A on, up to but without B.
+pub(super) fn frames(text: &str) -> Result<Range<u64>, String> {
+    let wanted = || "not A..B with A below B, as in 0..3 for the first three".to_string();
+    let (from, to) = text.split_once("..").ok_or_else(wanted)?;
+    let (from, to) = from.parse().ok().zip(to.parse().ok()).ok_or_else(wanted)?;
+    if from < to { Ok(from..to) } else { Err(wanted()) }
+}
+
+/// A clip size: a power of two from 64 to 2048.
+pub(super) fn clip_size(text: &str) -> Result<i64, String> {
+    let size = text
+        .parse::<i64>()
+        .ok()
+        .filter(|n| (64..=2048).contains(n) && n & (n - 1) == 0);
+    size.ok_or_else(|| "not a power of two from 64 to 2048".into())
+}
+
+/// Samples a pixel.
+pub(super) fn msaa(text: &str) -> Result<u32, String> {
+    match text {
+        "1" => Ok(1),
+        "4" => Ok(4),
+        _ => Err("neither 1 nor 4".into()),
+    }
+}
+
+/// A way of showing the terrain, by its name.
+pub(super) fn view(text: &str) -> Result<ViewMode, String> {
+    let known = ViewMode::NAMED.iter().find(|(name, _)| *name == text);
+    known.map(|(_, mode)| *mode).ok_or_else(|| {
+        let names: Vec<&str> = ViewMode::NAMED.iter().map(|(name, _)| *name).collect();
+        format!("not one of {}", names.join(", "))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_may_be_negative_and_must_be_finite() {
+        assert_eq!(place("-5,100,-3"), Ok([-5.0, 100.0, -3.0]));
+        assert_eq!(place("1e3, -0.5,.25"), Ok([1000.0, -0.5, 0.25]));
+        for bad in ["", "1,2", "1,2,3,4", "a,b,c", "nan,0,0", "0,inf,0", "1,,3"] {
+            assert!(place(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn sizes_frames_and_ranges_are_checked() {
+        assert_eq!(size("1280x720"), Ok([1280, 720]));
+        assert_eq!(size("8192X16"), Ok([8192, 16]));
+        for bad in ["", "1280", "0x5", "5x0", "-1x5", "1x2x3", "1.5x2"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+        assert_eq!(frames("0..3"), Ok(0..3));
+        for bad in ["", "3", "3..3", "5..2", "..4", "0..=3", "-1..3"] {
+            assert!(frames(bad).is_err(), "{bad}");
+        }
+        assert_eq!(clip_size("64"), Ok(64));
+        for bad in ["32", "100", "4096", "-64", "x"] {
+            assert!(clip_size(bad).is_err(), "{bad}");
+        }
+        assert_eq!(fov("0.01"), Ok(0.01));
+        assert!(fov("0").is_err() && fov("180").is_err() && pitch("90.1").is_err());
+        assert_eq!(pitch("-90"), Ok(-90.0));
+    }
+
+    #[test]
+    fn views_are_known_or_refused() {
+        for (name, mode) in ViewMode::NAMED {
+            assert_eq!(view(name), Ok(mode));
+        }
+        assert!(view("wires").unwrap_err().contains("shaded, light, level"));
+        assert_eq!((msaa("1"), msaa("4")), (Ok(1), Ok(4)));
+        assert!(msaa("2").is_err());
+    }
+}

@@ -1,0 +1,399 @@
+//! The program as a user meets it: exit status, standard output, standard error, and what is left in the folder.
+#![cfg(feature = "cli")]
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// What a run of the program gave.
+struct Ran {
+    status: i32,
+    out: String,
+    err: String,
+}
+
+fn program() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_clipscape"))
+}
+
+fn run<S: AsRef<OsStr>>(folder: &Path, arguments: &[S]) -> Ran {
+    let output = program()
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("the program starts");
+    Ran {
+        status: output.status.code().expect("no signal ended it"),
+        out: String::from_utf8(output.stdout).expect("text"),
+        err: String::from_utf8(output.stderr).expect("text"),
+    }
+}
+
+/// Runs, and expects success with nothing on standard error.
+fn done(folder: &Path, arguments: &[&str]) -> String {
+    let ran = run(folder, arguments);
+    assert_eq!((ran.status, ran.err.as_str()), (0, ""), "{arguments:?}");
+    ran.out
+}
+
+/// Runs, and expects failure: nothing on standard output, one line with all of `says` on standard error.
+fn fails(folder: &Path, status: i32, arguments: &[&str], says: &[&str]) {
+    let ran = run(folder, arguments);
+    assert_eq!(ran.status, status, "{arguments:?}: {}", ran.err);
+    assert_eq!(ran.out, "", "{arguments:?}");
+    assert!(
+        ran.err.starts_with("clipscape: ") && ran.err.ends_with('\n'),
+        "{arguments:?}: {}",
+        ran.err
+    );
+    assert_eq!(ran.err.lines().count(), 1, "{arguments:?}: {}", ran.err);
+    for part in says {
+        assert!(
+            ran.err.contains(part),
+            "{arguments:?}: {} should say {part}",
+            ran.err
+        );
+    }
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<_> = entries
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn help_and_version_go_to_standard_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = done(folder.path(), &["--help"]);
+    for command in [
+        "info",
+        "preprocess",
+        "Exit status: 0 done, 1 could not, 2 usage, 130 interrupted",
+    ] {
+        assert!(help.contains(command), "{help}");
+    }
+    assert!(done(folder.path(), &["preprocess", "--help"]).contains("--sky-directions"));
+    assert!(done(folder.path(), &["info", "--help"]).contains("--verify"));
+    assert_eq!(
+        done(folder.path(), &["--version"]),
+        format!("clipscape {}\n", env!("CARGO_PKG_VERSION"))
+    );
+}
+
+#[test]
+fn a_wrong_usage_is_status_2_and_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, says) in [
+        (&[][..], "no command"),
+        (&["flyy"], "unrecognized subcommand 'flyy'"),
+        (&["info"], "<INPUT>"),
+        (&["info", "a.tif", "--jsn"], "did you mean --json?"),
+        (&["preprocess", "a.tif", "--sun", "10,100"], "-90 to 90"),
+        (&["preprocess", "a.tif", "--memory", "lots"], "512M"),
+        (
+            &["preprocess", "a.tif", "--sky-directions", "-1"],
+            "--sky-directions",
+        ),
+        (
+            &["preprocess", "a.tif", "--no-light", "--sun", "10,10"],
+            "cannot be used with",
+        ),
+    ] {
+        fails(folder.path(), 2, arguments, &[says]);
+    }
+    assert!(names(folder.path()).is_empty());
+}
+
+#[test]
+fn inputs_that_are_none_get_one_line_and_leave_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::write(
+        here.join("text.tif"),
+        "These are not the heights you are looking for.\n",
+    )
+    .unwrap();
+    fs::write(here.join("empty.tif"), "").unwrap();
+    for command in ["info", "preprocess"] {
+        fails(here, 1, &[command, "none.tif"], &["none.tif: no such file"]);
+        fails(here, 1, &[command, "text.tif"], &["text.tif: "]);
+        fails(here, 1, &[command, "empty.tif"], &["empty.tif: "]);
+        fails(here, 1, &[command, "synth:0"], &["synth:0"]);
+        fails(here, 1, &[command, "."], &["folder"]);
+    }
+    assert_eq!(names(here), ["empty.tif", "text.tif"]);
+}
+
+#[cfg(feature = "dem")]
+#[test]
+fn a_tiff_that_ends_too_early_gets_one_line_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    done(here, &["synth", "300:7", "-o", "a.tif", "--quiet"]);
+    let whole = fs::read(here.join("a.tif")).unwrap();
+    for left in [whole.len() / 2, whole.len() - 1, 100, 8, 5] {
+        fs::write(here.join("cut.tif"), &whole[..left]).unwrap();
+        fails(
+            here,
+            1,
+            &["preprocess", "cut.tif", "--no-light", "--quiet"],
+            &["cut.tif: "],
+        );
+        fails(here, 1, &["info", "cut.tif"], &["cut.tif: "]);
+    }
+    assert_eq!(names(here), ["a.tif", "cut.tif"]);
+    done(here, &["preprocess", "a.tif", "--no-light", "--quiet"]);
+    assert_eq!(
+        names(here),
+        ["a.terrain.exr", "a.tif", "cut.tif"],
+        "control: the whole one gives a file"
+    );
+}
+
+#[test]
+fn an_output_that_exists_stays_unless_forced() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::write(here.join("o.terrain.exr"), "precious").unwrap();
+    fs::write(here.join("s.json"), "precious").unwrap();
+    let preprocess = [
+        "preprocess",
+        "synth:64",
+        "--no-light",
+        "--quiet",
+        "-o",
+        "o.terrain.exr",
+    ];
+    fails(here, 1, &preprocess, &["o.terrain.exr: ", "exists", "--force"]);
+    let mut arguments = vec![
+        "preprocess",
+        "synth:64",
+        "--no-light",
+        "--quiet",
+        "--stats",
+        "s.json",
+    ];
+    fails(here, 1, &arguments, &["s.json: ", "exists", "--force"]);
+    for name in ["o.terrain.exr", "s.json"] {
+        assert_eq!(fs::read(here.join(name)).unwrap(), b"precious");
+    }
+    assert_eq!(names(here), ["o.terrain.exr", "s.json"]);
+
+    arguments.extend(["--force", "-o", "o.terrain.exr"]);
+    done(here, &arguments);
+    assert!(fs::read(here.join("o.terrain.exr")).unwrap().len() > 1000);
+    let stats: serde_json::Value = serde_json::from_slice(&fs::read(here.join("s.json")).unwrap()).unwrap();
+    assert_eq!(stats["samples"], 64 * 64);
+    assert!(stats["total_s"].as_f64().is_some_and(|s| s > 0.0), "{stats}");
+    assert_eq!(names(here), ["o.terrain.exr", "s.json"]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_to_gets_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    // Below a regular file: even an administrator cannot write there.
+    fs::write(here.join("file"), "text").unwrap();
+    for output in ["file/o.terrain.exr", "none/o.terrain.exr"] {
+        fails(
+            here,
+            1,
+            &["preprocess", "synth:64", "--no-light", "-o", output],
+            &[&format!("{output}: ")],
+        );
+    }
+    let stats = ["preprocess", "synth:64", "--no-light", "--stats", "file/s.json"];
+    fails(here, 1, &stats, &["file/s.json: "]);
+    assert_eq!(names(here), ["file"]);
+}
+
+#[test]
+fn info_says_what_a_terrain_file_is_and_verify_finds_what_is_damaged() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    done(
+        here,
+        &[
+            "preprocess",
+            "synth:200:3",
+            "--sun",
+            "-45,30",
+            "--sky-directions",
+            "4",
+            "--quiet",
+        ],
+    );
+    assert_eq!(names(here), ["synth-200-3.terrain.exr"]);
+    let file = "synth-200-3.terrain.exr";
+
+    let json = done(here, &["info", "--json", file]);
+    assert_eq!(json.lines().count(), 1);
+    let info: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let at = |name: &str| {
+        json.find(&format!("\"{name}\":"))
+            .unwrap_or_else(|| panic!("no {name} in {json}"))
+    };
+    let documented = "format type width height spacing min max voids crs origin extent registration levels light \
+        assumed";
+    let places: Vec<usize> = documented.split_whitespace().map(at).collect();
+    assert!(places.is_sorted(), "{json}");
+    assert_eq!(info.as_object().unwrap().len(), places.len(), "{json}");
+    assert_eq!(
+        (&info["width"], &info["height"], &info["levels"]),
+        (&200.into(), &200.into(), &3.into())
+    );
+    assert_eq!(
+        (&info["voids"], &info["crs"]),
+        (&0.into(), &serde_json::Value::Null)
+    );
+    assert_eq!(info["light"]["sun"], serde_json::json!([-45.0, 30.0]));
+    assert_eq!(info["light"]["sky_directions"], 4);
+    assert!(info["min"].as_f64().unwrap() < info["max"].as_f64().unwrap());
+
+    let raw: serde_json::Value =
+        serde_json::from_str(&done(here, &["info", "--json", "synth:200:3"])).unwrap();
+    for same in ["width", "height", "spacing", "min", "max", "voids", "levels"] {
+        assert_eq!(raw[same], info[same], "{same}");
+    }
+    assert_eq!(raw["light"], serde_json::Value::Null);
+
+    let text = done(here, &["info", "--verify", file]);
+    assert!(
+        text.contains("200 x 200 samples") && text.contains("verified"),
+        "{text}"
+    );
+
+    let path = here.join(file);
+    let mut bytes = fs::read(&path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x10;
+    fs::write(&path, bytes).unwrap();
+    let ran = run(here, &["info", "--verify", file]);
+    assert_eq!((ran.status, ran.out.as_str()), (1, ""), "{}", ran.err);
+    assert!(
+        ran.err.lines().count() >= 1 && ran.err.lines().all(|l| l.starts_with("clipscape: ")),
+        "{}",
+        ran.err
+    );
+    assert!(ran.err.contains(file), "{}", ran.err);
+}
+
+#[test]
+fn a_terrain_file_is_not_preprocessed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    done(
+        here,
+        &[
+            "preprocess",
+            "synth:64",
+            "--no-light",
+            "--quiet",
+            "-o",
+            "a.terrain.exr",
+        ],
+    );
+    fails(
+        here,
+        1,
+        &["preprocess", "a.terrain.exr", "-o", "b.terrain.exr"],
+        &["terrain file already"],
+    );
+    assert_eq!(names(here), ["a.terrain.exr"]);
+}
+
+#[cfg(feature = "dem")]
+#[test]
+fn synth_writes_the_terrain_that_its_name_stands_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let ran = run(here, &["synth", "100:5", "-o", "a.tif"]);
+    assert_eq!((ran.status, ran.out.as_str()), (0, ""));
+    assert!(ran.err.contains("a.tif"), "{}", ran.err);
+    let json = |input: &str| -> serde_json::Value {
+        serde_json::from_str(&done(here, &["info", "--json", input])).unwrap()
+    };
+    let (file, name, other) = (json("a.tif"), json("synth:100:5"), json("synth:100:6"));
+    assert_eq!((&file["min"], &file["max"]), (&name["min"], &name["max"]));
+    assert_ne!(
+        file["max"], other["max"],
+        "control: another seed is other terrain"
+    );
+    fails(
+        here,
+        1,
+        &["synth", "100:5", "-o", "a.tif"],
+        &["a.tif: ", "exists", "--force"],
+    );
+    fails(here, 1, &["synth", "100:5", "-o", "a.png"], &["a.png: ", ".tif"]);
+    fails(here, 1, &["synth", "many", "-o", "b.tif"], &["synth:many"]);
+    assert_eq!(names(here), ["a.tif"]);
+}
+
+#[test]
+fn a_reader_that_stops_reading_is_no_failure() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in [&["--help"][..], &["info", "synth:64"]] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut command = program();
+        command
+            .args(arguments)
+            .current_dir(folder.path())
+            .stdout(writer)
+            .stderr(Stdio::piped());
+        let output = command.spawn().unwrap().wait_with_output().unwrap();
+        let err = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(
+            (output.status.code(), err.as_str()),
+            (Some(0), ""),
+            "{arguments:?}"
+        );
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_is_status_130_and_leaves_nothing() {
+    use std::time::{Duration, Instant};
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let arguments = [
+        "preprocess",
+        "synth:2000",
+        "--sky-directions",
+        "3600",
+        "-o",
+        "o.terrain.exr",
+    ];
+    let mut command = program();
+    command
+        .args(arguments)
+        .current_dir(here)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let child = command.spawn().unwrap();
+    let begun = Instant::now();
+    while names(here).is_empty() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "the work never began");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let id = child.id().to_string();
+    assert!(
+        Command::new("kill")
+            .args(["-INT", &id])
+            .status()
+            .unwrap()
+            .success()
+    );
+    let output = child.wait_with_output().unwrap();
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{err}");
+    assert!(err.lines().count() == 1 && err.contains("interrupted"), "{err}");
+    assert!(names(here).is_empty(), "{:?}", names(here));
+}

@@ -1,0 +1,35 @@
+#!/bin/sh
+# All that must hold before a change lands: format, lints, tests without and with a GPU, docs, a short demo.
+set -eu
+
+cd -- "$(dirname -- "$0")/.."
+. tools/setup.sh
+
+# A minimal Rust comes without these two.
+cargo fmt --version >/dev/null 2>&1 || rustup component add rustfmt
+cargo clippy --version >/dev/null 2>&1 || rustup component add clippy
+
+step() {
+    printf '\n== %s\n' "$*" >&2
+    "$@"
+}
+
+step cargo fmt --check
+step cargo clippy --locked --all-targets -- -D warnings
+step cargo clippy --locked --no-default-features --all-targets -- -D warnings
+step cargo test --locked --no-default-features
+step env CLIPSCAPE_REQUIRE_GPU=1 cargo test --locked
+step env RUSTDOCFLAGS='-D warnings' cargo doc --locked --no-deps
+
+CLIPSCAPE_OUT=$(mktemp -d)
+export CLIPSCAPE_OUT
+trap 'rm -rf "$CLIPSCAPE_OUT"' EXIT
+trap 'exit 130' INT TERM
+step sh tools/demo.sh --frames 0..3
+for file in pyrenees.terrain.exr contact-sheet.png flight.png flight.jsonl; do
+    [ -s "$CLIPSCAPE_OUT/$file" ] || { echo "clipscape: the demo left no $file" >&2; exit 1; }
+done
+[ "$(find "$CLIPSCAPE_OUT/flight" -name '*.png' | wc -l)" -eq 3 ] ||
+    { echo 'clipscape: the demo did not leave 3 frames' >&2; exit 1; }
+
+printf '\nAll passed.\n' >&2
