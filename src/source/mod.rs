@@ -1,10 +1,28 @@
 //! DEMs as their files give them: [`HeightSource`], one file per format, and procedural terrain.
 
+mod ascii_grid;
+mod file;
+mod geographic;
 mod georeference;
+#[cfg(feature = "dem")]
+mod geotiff;
+mod held;
+mod hgt;
+mod open;
+mod openexr;
+#[cfg(feature = "dem")]
+mod png;
 mod read_at;
+mod synth;
+#[cfg(feature = "dem")]
+mod write;
 
 pub use georeference::{Georeference, Registration};
+pub use open::{open, open_bytes};
 pub use read_at::{Cursor, ReadAt};
+pub use synth::{MAX_SYNTH_SIZE, Synth};
+#[cfg(feature = "dem")]
+pub use write::write_tiff;
 
 use crate::error::Result;
 use crate::grid::{Grid, Rect};

@@ -1,0 +1,163 @@
+//! SRTM tiles, `.hgt`: a square of big-endian 16-bit heights without a header.
+//!
+//! A tile of one degree holds 1201 x 1201 (3 arc seconds) or 3601 x 3601 (1 arc second) heights in metres
+//! above the EGM96 geoid, rows from north to south, -32768 for no data; samples lie on whole arc seconds, so
+//! neighbours share their border. The name, as `N42E001.hgt`, is the place of the *south-west* sample (USGS,
+//! SRTM Topo, quickstart document of version 2, sections 2.1.1 to 2.1.3).
+
+use super::held::{Held, Scale, Values, size};
+use super::{Description, Georeference, ReadAt, Registration, geographic};
+use crate::error::{Error, ErrorKind, Result};
+use crate::grid::Grid;
+
+const SIDES: [u64; 2] = [1201, 3601];
+const VOID: i16 = -32768;
+
+/// Reads the tile `name`, a path that ends in a name like `N42E001.hgt`.
+pub(super) fn open(name: &str, bytes: &dyn ReadAt) -> Result<Held> {
+    let length = bytes.size_bytes();
+    let side = SIDES.into_iter().find(|n| 2 * n * n == length).ok_or_else(|| {
+        let what = format!(
+            "{length} bytes are no SRTM tile, which has {} (1201 x 1201) or {} (3601 x 3601)",
+            2 * 1201 * 1201,
+            2 * 3601 * 3601
+        );
+        Error::new(ErrorKind::Broken, name, what).advice("fetch the file again")
+    })?;
+    let [longitude, latitude] = corner(name).ok_or_else(|| {
+        Error::new(
+            ErrorKind::Broken,
+            name,
+            "the name of an SRTM tile must tell its place",
+        )
+        .advice("name it like N42E001.hgt, after its south-west corner")
+    })?;
+
+    let mut values = Values::new(name, (side * side) as usize)?;
+    let mut row = vec![0u8; 2 * side as usize];
+    for z in 0..side {
+        let row_bytes = row.len() as u64;
+        bytes
+            .read_exact_at(z * row_bytes, &mut row)
+            .map_err(|error| Error::io(name, error))?;
+        for (x, pair) in row.chunks_exact(2).enumerate() {
+            let value = i16::from_be_bytes([pair[0], pair[1]]);
+            let height = if value == VOID { f64::NAN } else { f64::from(value) };
+            values.set(name, (z * side) as usize + x, height)?;
+        }
+    }
+    let heights = values.finish(name, Scale::METRES)?;
+
+    let step = 1.0 / (side - 1) as f64;
+    let place = Georeference {
+        crs: Some("EPSG:4326".into()),
+        origin: [longitude, latitude + 1.0],
+        pixel: [step, -step],
+        registration: Registration::Point,
+        geographic: true,
+    };
+    let size = size(side, side);
+    let (spacing_m, sentence) =
+        geographic::spacing_m(&place, size).map_err(|what| Error::new(ErrorKind::Broken, name, what))?;
+    let description = Description {
+        grid: Grid {
+            base_m: heights.base_m,
+            ..Grid::new(size.width, size.height, spacing_m)
+        },
+        format: "SRTM".into(),
+        sample_type: "int16".into(),
+        step_m: Some(1.0),
+        place: Some(place),
+        vertical_unit: "metre".into(),
+        assumed: vec![
+            sentence,
+            "As an SRTM tile it is taken to be on WGS84, with heights in metres above the EGM96 geoid."
+                .into(),
+        ],
+        name: name.into(),
+    };
+    Held::new(description, heights.heights)
+}
+
+/// Longitude and latitude of the south-west sample, from a name like `N42E001` or `s29w072`, with or without
+/// folders and endings.
+fn corner(name: &str) -> Option<[f64; 2]> {
+    let stem = name.rsplit(['/', '\\']).next()?.split('.').next()?;
+    let tile = stem.get(..7)?;
+    let number = |range: std::ops::Range<usize>| {
+        let digits = tile.get(range)?;
+        if !digits.bytes().all(|b| b.is_ascii_digit()) {
+            return None;
+        }
+        digits.parse::<f64>().ok()
+    };
+    let sign = |at: usize, plus: u8, minus: u8| match tile.as_bytes()[at].to_ascii_uppercase() {
+        c if c == plus => Some(1.0),
+        c if c == minus => Some(-1.0),
+        _ => None,
+    };
+    let latitude = sign(0, b'N', b'S')? * number(1..3)?;
+    let longitude = sign(3, b'E', b'W')? * number(4..7)?;
+    let on_earth = (-90.0..90.0).contains(&latitude) && (-180.0..180.0).contains(&longitude);
+    on_earth.then_some([longitude, latitude])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::HeightSource;
+    use super::*;
+    use crate::grid::Rect;
+
+    fn tile() -> Vec<u8> {
+        let mut bytes = vec![0u8; 2 * 1201 * 1201];
+        let mut put = |x: usize, z: usize, h: i16| {
+            bytes[2 * (z * 1201 + x)..][..2].copy_from_slice(&h.to_be_bytes());
+        };
+        put(0, 0, 1234);
+        put(1200, 0, -32768);
+        put(0, 1200, -5);
+        put(1200, 1200, 32767);
+        bytes
+    }
+
+    #[test]
+    fn rows_run_from_north_and_the_name_is_the_south_west_corner() {
+        let held = open("some/N42E001.hgt", &tile()).unwrap();
+        let d = held.description();
+        let place = d.place.as_ref().unwrap();
+        assert_eq!(place.origin, [1.0, 43.0]);
+        let [east, south] = place.place(1200.0, 1200.0);
+        assert!((east - 2.0).abs() < 1e-12 && (south - 42.0).abs() < 1e-12);
+        assert_eq!((d.step_m, d.grid.base_m), (Some(1.0), 0.0));
+        let mut out = vec![0.0; 1201 * 1201];
+        held.read(d.grid.size.rect(), &mut out).unwrap();
+        assert_eq!(
+            (out[0], out[1200 * 1201], out[1201 * 1201 - 1]),
+            (1234.0, -5.0, 32767.0)
+        );
+        assert!(out[1200].is_nan());
+        let mut one = [0.0];
+        held.read(Rect::new(0, 1200, 1, 1201), &mut one).unwrap();
+        assert_eq!(one, [-5.0]);
+    }
+
+    #[test]
+    fn names_of_all_quarters_are_understood_and_others_refused() {
+        assert_eq!(corner("S29W072.hgt"), Some([-72.0, -29.0]));
+        assert_eq!(corner("a\\n00e179.SRTMGL1.hgt"), Some([179.0, 0.0]));
+        for bad in [
+            "hills.hgt",
+            "N4E001.hgt",
+            "N42E1.hgt",
+            "N99E001.hgt",
+            "N42E180.hgt",
+            "X42E001.hgt",
+            "N+2E001",
+        ] {
+            assert_eq!(corner(bad), None, "{bad}");
+        }
+        assert_eq!(open("hills.hgt", &tile()).unwrap_err().kind(), ErrorKind::Broken);
+        let error = open("N42E001.hgt", &tile()[..2_884_000].to_vec()).unwrap_err();
+        assert!(error.to_string().contains("2884000 bytes"), "{error}");
+    }
+}
