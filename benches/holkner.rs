@@ -37,7 +37,11 @@ impl<'a> Crop<'a> {
     fn new(whole: &'a dyn Levels, first: i64, size: i64) -> Result<Self> {
         let grid = Grid::new(size, size, whole.grid().spacing_m);
         if first % (PATCH << (grid.file_levels() - 1)) != 0 {
-            return Err(Error::new(ErrorKind::Misuse, "crop", "does not begin with a patch of its coarsest level"));
+            return Err(Error::new(
+                ErrorKind::Misuse,
+                "crop",
+                "does not begin with a patch of its coarsest level",
+            ));
         }
         Ok(Self { whole, grid, first })
     }
@@ -117,13 +121,24 @@ fn run(rounds: usize, size_px: [u32; 2]) -> Result<()> {
     let first = (LARGE - SMALL) / 2;
     let small = Crop::new(&large, first, SMALL)?;
     let gpu = clipscape::gpu::open()?;
-    println!("{} ({}), {}x{} pixels, medians of {rounds} rounds", gpu.info.name, gpu.driver(), size_px[0], size_px[1]);
+    println!(
+        "{} ({}), {}x{} pixels, medians of {rounds} rounds",
+        gpu.info.name,
+        gpu.driver(),
+        size_px[0],
+        size_px[1]
+    );
     let mut pairs = Vec::new();
     for clip_size in CLIP_SIZES {
         for count in LEVELS {
             let make = |terrain, first| setting(&gpu, terrain, first, clip_size, count, size_px);
             let small = (count <= small.grid.levels_until(clip_size)).then(|| make(&small, 0));
-            pairs.push((clip_size, count, small.transpose()?, make(&large as &dyn Levels, first)?));
+            pairs.push((
+                clip_size,
+                count,
+                small.transpose()?,
+                make(&large as &dyn Levels, first)?,
+            ));
         }
     }
     for (clip_size, count, small, large) in &mut pairs {
@@ -131,7 +146,10 @@ fn run(rounds: usize, size_px: [u32; 2]) -> Result<()> {
         if let Some(small) = small {
             let same = small.first_draw()? == reference;
             let inside = *clip_size << (*count - 1) <= SMALL;
-            assert!(same || !inside, "clip size {clip_size}, {count} levels: the two terrains draw other pictures");
+            assert!(
+                same || !inside,
+                "clip size {clip_size}, {count} levels: the two terrains draw other pictures"
+            );
         }
     }
     for _ in 0..rounds {
@@ -160,22 +178,49 @@ fn setting<'a>(
         haze: true,
         traced_light: false,
         sun: Sun::default(),
-        clipmap: ClipmapOptions { clip_size, levels: Some(levels), cull: false, ..Default::default() },
+        clipmap: ClipmapOptions {
+            clip_size,
+            levels: Some(levels),
+            cull: false,
+            ..Default::default()
+        },
     };
     let middle = SMALL / 2 + first;
     let mut ground = [0.0];
-    if terrain.heights(0, Rect::new(middle, middle, middle + 1, middle + 1), &mut ground)? != Arrival::Arrived {
-        return Err(Error::new(ErrorKind::Broken, "terrain", "has no ground in the middle"));
+    if terrain.heights(0, Rect::new(middle, middle, middle + 1, middle + 1), &mut ground)? != Arrival::Arrived
+    {
+        return Err(Error::new(
+            ErrorKind::Broken,
+            "terrain",
+            "has no ground in the middle",
+        ));
     }
     let [dx, dz] = terrain.grid().spacing_m;
-    let eye = DVec3::new(middle as f64 * dx, f64::from(ground[0]) + 60.0, middle as f64 * dz);
-    let camera = Camera { eye, heading_deg: 0.0, pitch_deg: -10.0, roll_deg: 0.0, fov_deg: 60.0 };
+    let eye = DVec3::new(
+        middle as f64 * dx,
+        f64::from(ground[0]) + 60.0,
+        middle as f64 * dz,
+    );
+    let camera = Camera {
+        eye,
+        heading_deg: 0.0,
+        pitch_deg: -10.0,
+        roll_deg: 0.0,
+        fov_deg: 60.0,
+    };
     let headless = Headless::new(gpu.clone(), terrain, &options)?;
-    Ok(Setting { terrain, headless, camera, draw_ms: Vec::new() })
+    Ok(Setting {
+        terrain,
+        headless,
+        camera,
+        draw_ms: Vec::new(),
+    })
 }
 
 fn table(pairs: &[(i64, u32, Option<Setting<'_>>, Setting<'_>)]) {
-    println!("frames per second: terrain {SMALL} / terrain {LARGE} (ratio; * where all windows lie inside both)");
+    println!(
+        "frames per second: terrain {SMALL} / terrain {LARGE} (ratio; * where all windows lie inside both)"
+    );
     print!("{:>9}", "clip size");
     LEVELS.for_each(|count| print!("{:>26}", format!("{count} levels")));
     println!();
@@ -185,7 +230,11 @@ fn table(pairs: &[(i64, u32, Option<Setting<'_>>, Setting<'_>)]) {
             let cell = match small {
                 Some(small) => {
                     let (small, large) = (small.fps(), large.fps());
-                    let mark = if clip_size << (count - 1) <= SMALL { "*" } else { "" };
+                    let mark = if clip_size << (count - 1) <= SMALL {
+                        "*"
+                    } else {
+                        ""
+                    };
                     format!("{small:.1} / {large:.1} ({:.2}{mark})", small / large)
                 }
                 None => format!("/ {:.1}", large.fps()),

@@ -41,9 +41,23 @@ fn pyrenees() -> &'static Pyramid {
         let mut heights = vec![0.0; description.grid.size.samples() as usize];
         source.read(description.grid.size.rect(), &mut heights).unwrap();
         let (work, filter) = (Threads::new(0).unwrap(), Filter::default());
-        let light = trace_light(&description.grid, &heights, &LightOptions::default(), &filter, &work, &Silent);
-        let mut pyramid =
-            Pyramid::new(description.grid, heights, description.step_m, &filter, &work, &Silent).unwrap();
+        let light = trace_light(
+            &description.grid,
+            &heights,
+            &LightOptions::default(),
+            &filter,
+            &work,
+            &Silent,
+        );
+        let mut pyramid = Pyramid::new(
+            description.grid,
+            heights,
+            description.step_m,
+            &filter,
+            &work,
+            &Silent,
+        )
+        .unwrap();
         pyramid.bound(&work, &Silent).unwrap();
         pyramid.set_light(light.unwrap()).unwrap();
         pyramid
@@ -65,7 +79,13 @@ fn options() -> HeadlessOptions {
 
 fn near() -> Camera {
     let eye = DVec3::new(40_000.0, 3_200.0, 75_000.0);
-    Camera { eye, heading_deg: 330.0, pitch_deg: -12.0, roll_deg: 0.0, fov_deg: 60.0 }
+    Camera {
+        eye,
+        heading_deg: 330.0,
+        pitch_deg: -12.0,
+        roll_deg: 0.0,
+        fov_deg: 60.0,
+    }
 }
 
 fn draw(options: &HeadlessOptions, camera: &Camera) -> Option<Vec<u8>> {
@@ -83,26 +103,37 @@ fn difference(a: &[u8], b: &[u8]) -> (f64, f64) {
 }
 
 fn read(path: &Path) -> Vec<u8> {
-    let file = File::open(path).unwrap_or_else(|e| panic!("{}: {e}; CLIPSCAPE_BLESS=1 writes it", path.display()));
+    let file =
+        File::open(path).unwrap_or_else(|e| panic!("{}: {e}; CLIPSCAPE_BLESS=1 writes it", path.display()));
     let mut reader = png::Decoder::new(BufReader::new(file)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     let info = reader.next_frame(&mut pixels).unwrap();
     assert_eq!((info.width, info.height), (SIZE_PX[0], SIZE_PX[1]));
-    pixels.chunks(info.color_type.samples()).flat_map(|p| [p[0], p[1], p[2], 255]).collect()
+    pixels
+        .chunks(info.color_type.samples())
+        .flat_map(|p| [p[0], p[1], p[2], 255])
+        .collect()
 }
 
 fn compare(name: &str, pixels: &[u8]) {
     let path = Path::new("tests/golden").join(format!("{name}.png"));
     if std::env::var_os("CLIPSCAPE_BLESS").is_some_and(|v| v == "1") {
         write_png(&path, SIZE_PX[0], SIZE_PX[1], pixels).unwrap();
-        panic!("wrote {}; look at it, then run again without CLIPSCAPE_BLESS", path.display());
+        panic!(
+            "wrote {}; look at it, then run again without CLIPSCAPE_BLESS",
+            path.display()
+        );
     }
     let golden = read(&path);
     let (mean, far) = difference(pixels, &golden);
     if mean > MEAN_LIMIT || far > FAR_SHARE_LIMIT {
         let seen = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.png"));
         write_beside(&seen, &golden, pixels);
-        panic!("{name}: mean difference {mean:.3}, {:.3} % differ by more than {FAR}; see {}", far * 1e2, seen.display());
+        panic!(
+            "{name}: mean difference {mean:.3}, {:.3} % differ by more than {FAR}; see {}",
+            far * 1e2,
+            seen.display()
+        );
     }
 }
 
@@ -123,39 +154,65 @@ fn the_whole_dem() {
     let camera = overview(pyrenees().grid(), 349.0, 3100.0, 16.0 / 9.0);
     let mut options = options();
     options.clipmap.clip_size = 512;
-    let Some(pixels) = draw(&options, &camera) else { return };
+    let Some(pixels) = draw(&options, &camera) else {
+        return;
+    };
     compare("whole", &pixels);
 }
 
 #[test]
 fn a_view_from_among_the_mountains() {
-    let Some(pixels) = draw(&options(), &near()) else { return };
+    let Some(pixels) = draw(&options(), &near()) else {
+        return;
+    };
     compare("near", &pixels);
 }
 
 #[test]
 fn the_bare_light_at_four_samples_a_pixel() {
-    let options = HeadlessOptions { view_mode: ViewMode::Light, sample_count: 4, ..options() };
-    let Some(pixels) = draw(&options, &near()) else { return };
+    let options = HeadlessOptions {
+        view_mode: ViewMode::Light,
+        sample_count: 4,
+        ..options()
+    };
+    let Some(pixels) = draw(&options, &near()) else {
+        return;
+    };
     compare("light", &pixels);
 }
 
 #[test]
 fn control_a_slightly_different_frame_is_caught() {
-    let Some(pixels) = draw(&options(), &near()) else { return };
-    let turned = Camera { heading_deg: 330.3, ..near() };
+    let Some(pixels) = draw(&options(), &near()) else {
+        return;
+    };
+    let turned = Camera {
+        heading_deg: 330.3,
+        ..near()
+    };
     let (mean, far) = difference(&pixels, &draw(&options(), &turned).unwrap());
     assert!(mean > MEAN_LIMIT || far > FAR_SHARE_LIMIT, "{mean} {far}");
-    let no_haze = HeadlessOptions { haze: false, ..options() };
+    let no_haze = HeadlessOptions {
+        haze: false,
+        ..options()
+    };
     let (mean, far) = difference(&pixels, &draw(&no_haze, &near()).unwrap());
     assert!(mean > MEAN_LIMIT || far > FAR_SHARE_LIMIT, "{mean} {far}");
 }
 
 #[test]
 fn frames_are_the_same_bytes_from_run_to_run_and_without_culling() {
-    let Some(pixels) = draw(&options(), &near()) else { return };
-    assert!(pixels == draw(&options(), &near()).unwrap(), "another run draws other bytes");
+    let Some(pixels) = draw(&options(), &near()) else {
+        return;
+    };
+    assert!(
+        pixels == draw(&options(), &near()).unwrap(),
+        "another run draws other bytes"
+    );
     let mut all = options();
     all.clipmap.cull = false;
-    assert!(pixels == draw(&all, &near()).unwrap(), "without culling the picture is another");
+    assert!(
+        pixels == draw(&all, &near()).unwrap(),
+        "without culling the picture is another"
+    );
 }

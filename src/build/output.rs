@@ -76,7 +76,9 @@ impl Output {
         let folder = self.target.parent().map(Path::to_path_buf);
         self.publish_unsynced()?;
         // The name itself is safe once the folder is synced; where folders cannot be, nothing is lost.
-        let folder = folder.filter(|f| !f.as_os_str().is_empty()).unwrap_or_else(|| ".".into());
+        let folder = folder
+            .filter(|f| !f.as_os_str().is_empty())
+            .unwrap_or_else(|| ".".into());
         let _ = File::open(folder).and_then(|f| f.sync_all());
         Ok(())
     }

@@ -37,15 +37,27 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     let out = args.output.clone().unwrap_or_else(|| default_output(args));
     let flight_file = args.flight.as_deref().filter(|f| *f != Path::new("orbit"));
     let flight_json = flight_file.map(read_flight).transpose()?;
-    let ring = ClipmapOptions { clip_size: clip_size(args), transition: args.view.transition, ..Default::default() };
+    let ring = ClipmapOptions {
+        clip_size: clip_size(args),
+        transition: args.view.transition,
+        ..Default::default()
+    };
     ring.ring()?;
-    let stats = args.view.stats.as_deref().map(|path| Output::create(path, args.force)).transpose()?;
+    let stats = args
+        .view
+        .stats
+        .as_deref()
+        .map(|path| Output::create(path, args.force))
+        .transpose()?;
     let gpu = gpu::open()?;
 
     let terrain = Terrain::open(&args.input.to_string_lossy(), terminal)?;
     warn_of_sun(args, &terrain, terminal);
     let mut headless = Headless::new(gpu, &terrain, &headless_options(&args.view, &terrain, &ring))?;
-    let [low, high] = headless.clipmap().height_range_m().map(|h| f64::from(h) + terrain.grid().base_m);
+    let [low, high] = headless
+        .clipmap()
+        .height_range_m()
+        .map(|h| f64::from(h) + terrain.grid().base_m);
     let aspect = f64::from(args.view.size[0]) / f64::from(args.view.size[1]);
     let shot = match (&flight_json, args.flight.is_some(), args.eye) {
         (Some((name, json)), ..) => Shot::Flight(Box::new(Flight::parse(name, json)?)),
@@ -82,7 +94,11 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     for fault in terrain.faults() {
         terminal.warn(&fault.to_string());
     }
-    let what = if frames.len() == 1 { "1 frame".to_string() } else { format!("{} frames", frames.len()) };
+    let what = if frames.len() == 1 {
+        "1 frame".to_string()
+    } else {
+        format!("{} frames", frames.len())
+    };
     terminal.note(&format!("{} holds {what}", out.display()));
     Ok(())
 }
@@ -91,7 +107,11 @@ fn default_output(args: &RenderArgs) -> PathBuf {
     let ending = if args.flight.is_some() { "" } else { ".png" };
     let out = beside(&args.input, ending);
     // An input without an ending of its own is no folder for frames.
-    if out == args.input { beside(&args.input, ".frames") } else { out }
+    if out == args.input {
+        beside(&args.input, ".frames")
+    } else {
+        out
+    }
 }
 
 fn read_flight(path: &Path) -> Result<(String, String)> {
@@ -166,9 +186,11 @@ fn write_stats(mut file: &fs::File, path: &Path, frames: &[FrameStats], run: Run
         text += &serde_json::to_string(frame).expect("numbers are valid JSON");
         text.push('\n');
     }
-    text += &serde_json::to_string(&SummaryStats::new(run, frames)).expect("numbers and texts are valid JSON");
+    text +=
+        &serde_json::to_string(&SummaryStats::new(run, frames)).expect("numbers and texts are valid JSON");
     text.push('\n');
-    file.write_all(text.as_bytes()).map_err(|e| Error::io(path.display(), e))
+    file.write_all(text.as_bytes())
+        .map_err(|e| Error::io(path.display(), e))
 }
 
 fn checksum(bytes: &[u8]) -> String {

@@ -49,11 +49,18 @@ impl Recording {
         fs::create_dir_all(&self.folder).map_err(|e| folder_error(&self.folder, e))?;
         let [width, height] = headless.size_px();
         let count = frames.end - frames.start;
-        let mut sheet = self.contact_sheet.as_ref().map(|_| ContactSheet::new(count, SHEET_FRAMES, width, height));
+        let mut sheet = self
+            .contact_sheet
+            .as_ref()
+            .map(|_| ContactSheet::new(count, SHEET_FRAMES, width, height));
         let mut animation = match &self.animation {
             Some(path) => {
                 let most = u32::try_from(count).map_err(|_| {
-                    Error::new(ErrorKind::Limit, path.display(), format!("{count} frames are too many for an animation"))
+                    Error::new(
+                        ErrorKind::Limit,
+                        path.display(),
+                        format!("{count} frames are too many for an animation"),
+                    )
                 })?;
                 Some(Animation::create(path, most, width, height, flight.fps())?)
             }
@@ -91,13 +98,19 @@ impl Recording {
         let all = 0..flight.frame_count();
         let frames = self.frames.clone().unwrap_or_else(|| all.clone());
         if frames.is_empty() || frames.end > all.end {
-            let what = format!("frames {}..{} are not in a flight of {}", frames.start, frames.end, all.end);
+            let what = format!(
+                "frames {}..{} are not in a flight of {}",
+                frames.start, frames.end, all.end
+            );
             return Err(Error::new(ErrorKind::Misuse, "frames", what)
                 .advice(format!("name a range within 0..{}, its end excluded", all.end)));
         }
         if !self.force {
             let pictures = frames.clone().map(|k| self.picture(k));
-            let others = [&self.contact_sheet, &self.animation].into_iter().flatten().cloned();
+            let others = [&self.contact_sheet, &self.animation]
+                .into_iter()
+                .flatten()
+                .cloned();
             for path in pictures.chain(others) {
                 refuse_existing(&path)?;
             }
@@ -140,7 +153,8 @@ fn refuse_existing(path: &Path) -> Result<()> {
 
 fn folder_error(folder: &Path, error: std::io::Error) -> Error {
     if folder.exists() {
-        return Error::new(ErrorKind::Misuse, folder.display(), "is no folder").advice("name a folder for the frames");
+        return Error::new(ErrorKind::Misuse, folder.display(), "is no folder")
+            .advice("name a folder for the frames");
     }
     Error::io(folder.display(), error)
 }

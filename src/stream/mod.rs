@@ -34,7 +34,10 @@ pub enum Origin {
 
 impl std::fmt::Debug for Terrain {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Terrain").field("name", &self.name).field("origin", &self.origin).finish_non_exhaustive()
+        f.debug_struct("Terrain")
+            .field("name", &self.name)
+            .field("origin", &self.origin)
+            .finish_non_exhaustive()
     }
 }
 
@@ -60,7 +63,11 @@ impl Terrain {
         if is_terrain(bytes.as_ref()) {
             let file = TerrainFile::open(name, bytes)?;
             let origin = Origin::File(Box::new(file.meta().clone()));
-            return Ok(Self { name: name.to_string(), levels: Box::new(file), origin });
+            return Ok(Self {
+                name: name.to_string(),
+                levels: Box::new(file),
+                origin,
+            });
         }
         Self::from_source(source::open_bytes(name, bytes)?.as_ref(), progress)
     }
@@ -102,10 +109,10 @@ impl Terrain {
     /// The sun whose light was traced, where there is light.
     pub fn sun(&self) -> Option<Sun> {
         match &self.origin {
-            Origin::File(meta) => meta
-                .light
-                .as_ref()
-                .map(|l| Sun { azimuth_deg: l.sun_azimuth_deg, altitude_deg: l.sun_altitude_deg }),
+            Origin::File(meta) => meta.light.as_ref().map(|l| Sun {
+                azimuth_deg: l.sun_azimuth_deg,
+                altitude_deg: l.sun_altitude_deg,
+            }),
             Origin::Dem(_) => None,
         }
     }
