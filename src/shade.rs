@@ -57,7 +57,7 @@ pub struct ShadeConstants {
 impl ShadeConstants {
     /// The constants for a DEM with heights in `range_m` above `base_m`.
     pub fn new(sun: &Sun, range_m: [f32; 2], base_m: f64, vertical_scale: f64) -> Self {
-        let [x, y, z] = sun.direction().to_array();
+        let [x, y, z] = sun.direction();
         Self {
             to_sun: [x as f32, y as f32, z as f32, 0.0],
             low_m: range_m[0],
@@ -69,17 +69,17 @@ impl ShadeConstants {
 }
 
 /// Light of the full sun on a surface that faces it.
-pub const SUN_LIGHT: Vec3 = Vec3::new(2.9, 2.65, 2.25);
+pub const SUN_LIGHT: Vec3 = Vec3::new(3.0, 2.75, 2.35);
 /// Light of the whole sky.
-pub const SKY_LIGHT: Vec3 = Vec3::new(0.42, 0.55, 0.78);
+pub const SKY_LIGHT: Vec3 = Vec3::new(0.40, 0.52, 0.74);
 /// Share of the sun and of the sky in the grey of the light view.
 pub const LIGHT_VIEW: [f32; 2] = [0.8, 0.2];
 /// Ground at the lowest.
-pub const GROUND_LOW: Vec3 = Vec3::new(0.095, 0.145, 0.045);
+pub const GROUND_LOW: Vec3 = Vec3::new(0.080, 0.125, 0.035);
 /// Ground a little below the middle.
-pub const GROUND_MIDDLE: Vec3 = Vec3::new(0.185, 0.20, 0.085);
+pub const GROUND_MIDDLE: Vec3 = Vec3::new(0.165, 0.175, 0.065);
 /// Ground at the highest, where it is not snow.
-pub const GROUND_HIGH: Vec3 = Vec3::new(0.33, 0.27, 0.19);
+pub const GROUND_HIGH: Vec3 = Vec3::new(0.30, 0.24, 0.16);
 /// Steep ground.
 pub const GROUND_ROCK: Vec3 = Vec3::new(0.235, 0.215, 0.20);
 /// Snow.
@@ -97,17 +97,17 @@ pub const RELIEF_LEAST_M: f32 = 300.0;
 /// Height in metres by which the air's density falls to 1/e.
 pub const HAZE_SCALE_M: f32 = 8000.0;
 /// Extinction by wavelength at the lowest ground, per metre: blue scatters most.
-pub const HAZE_PER_M: Vec3 = Vec3::new(0.9e-5, 1.3e-5, 2.0e-5);
+pub const HAZE_PER_M: Vec3 = Vec3::new(0.45e-5, 0.75e-5, 1.3e-5);
 /// The sky at the horizon, which is also the colour of much air.
-pub const SKY_HORIZON: Vec3 = Vec3::new(0.78, 0.93, 1.12);
+pub const SKY_HORIZON: Vec3 = Vec3::new(0.75, 0.95, 1.20);
 /// The sky overhead.
-pub const SKY_ZENITH: Vec3 = Vec3::new(0.12, 0.30, 0.72);
+pub const SKY_ZENITH: Vec3 = Vec3::new(0.10, 0.27, 0.70);
 /// Below the horizon, where no terrain is.
-pub const SKY_BELOW: Vec3 = Vec3::new(0.42, 0.50, 0.60);
+pub const SKY_BELOW: Vec3 = Vec3::new(0.30, 0.38, 0.48);
 /// Around the sun.
 pub const SUN_GLOW: Vec3 = Vec3::new(0.55, 0.42, 0.22);
 /// Exposure before the tone curve `1 - exp(-x)`.
-pub const EXPOSURE: f32 = 1.25;
+pub const EXPOSURE: f32 = 0.85;
 /// Interpolated validity below which a fragment belongs to a hole. A corner's share of a triangle may round to a few
 /// ulps above 0 along the opposite side; 2^-16 of a triangle is below any pixel.
 pub const VALID_LEAST: f32 = 1.0 - 1.0 / 65536.0;

@@ -16,9 +16,9 @@ pub struct FrameStats {
     pub t_s: f64,
     /// Where the camera stood: world metres, before vertical scale.
     pub eye: [f64; 3],
-    /// Choosing patches and planning the update.
+    /// Moving the windows, reading what that exposes, and choosing patches.
     pub plan_ms: f64,
-    /// Reading what is newly exposed and handing it to the device.
+    /// Handing what is newly exposed to the device.
     pub upload_ms: f64,
     /// Drawing, to completion.
     pub draw_ms: f64,

@@ -152,7 +152,9 @@ fn planned_contents_equal_a_naive_re_read_after_any_walk() {
 
 #[test]
 fn control_a_plan_that_forgets_a_rectangle_is_caught() {
-    let forget = |plan: &mut LevelPlan| drop(plan.heights.pop());
+    let forget = |plan: &mut LevelPlan| {
+        plan.heights.pop();
+    };
     assert!(walk(100, seed(1), forget).unwrap_err().contains("stale"));
     let shrink = |plan: &mut LevelPlan| plan.light.iter_mut().for_each(|r| r.x1 -= 1);
     let shrunk = std::panic::catch_unwind(|| walk(100, seed(1), shrink));

@@ -14,7 +14,6 @@ mod threads;
 
 pub use crate::terrain::SourceStamp;
 pub use memory::{DEFAULT_MEMORY_BYTES, needed_bytes, peak_rss_bytes};
-#[cfg(any(feature = "cli", feature = "gpu"))]
-pub(crate) use output::Output;
+pub use output::Output;
 pub use preprocess::{PreprocessOptions, PreprocessReport, build_pyramid, preprocess};
 pub use threads::Threads;

@@ -7,8 +7,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// A temporary file beside its target. Dropped without [`Output::publish`], it is removed.
-pub(crate) struct Output {
+/// A temporary file beside its target. Dropped without being published, it is removed.
+#[derive(Debug)]
+pub struct Output {
     target: PathBuf,
     temporary: PathBuf,
     force: bool,
@@ -16,7 +17,11 @@ pub(crate) struct Output {
 
 impl Output {
     /// Creates the temporary file, open for writing. A target that exists is refused unless `force`.
-    pub(crate) fn create(target: &Path, force: bool) -> Result<(Self, File)> {
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] where the target exists or names no file, [`ErrorKind::Io`] where its folder is missing
+    /// or may not be written to.
+    pub fn create(target: &Path, force: bool) -> Result<(Self, File)> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         let Some(name) = target.file_name() else {
             let what = "names no file";
@@ -57,46 +62,46 @@ impl Output {
     }
 
     /// What the file will be called.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn target(&self) -> &Path {
+    pub fn target(&self) -> &Path {
         &self.target
     }
 
     /// Syncs the file and gives it its name. Without `force` a target that has appeared meanwhile stays.
-    pub(crate) fn publish(self, file: &File) -> Result<()> {
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] where the system refuses, [`ErrorKind::Misuse`] where the target has appeared; then the
+    /// target is as it was.
+    pub fn publish(self, file: &File) -> Result<()> {
         file.sync_all().map_err(|e| Error::io(self.target.display(), e))?;
-        self.name()?;
+        let folder = self.target.parent().map(Path::to_path_buf);
+        self.publish_unsynced()?;
         // The name itself is safe once the folder is synced; where folders cannot be, nothing is lost.
-        if let Some(folder) = self.target.parent() {
-            let folder = if folder.as_os_str().is_empty() {
-                Path::new(".")
-            } else {
-                folder
-            };
-            let _ = File::open(folder).and_then(|f| f.sync_all());
-        }
+        let folder = folder
+            .filter(|f| !f.as_os_str().is_empty())
+            .unwrap_or_else(|| ".".into());
+        let _ = File::open(folder).and_then(|f| f.sync_all());
         Ok(())
     }
 
-    /// The same without waiting for the disk: for what can soon be made again, and comes by the hundred.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn publish_unsynced(self) -> Result<()> {
-        self.name()
-    }
-
-    fn name(&self) -> Result<()> {
+    /// Gives the file its name without waiting for the disk: for what can be made again, hundreds of it.
+    ///
+    /// # Errors
+    /// As [`Output::publish`].
+    pub fn publish_unsynced(self) -> Result<()> {
         let refused = |e| Error::io(self.target.display(), e);
         if self.force {
-            return fs::rename(&self.temporary, &self.target).map_err(refused);
+            fs::rename(&self.temporary, &self.target).map_err(refused)?;
+        } else {
+            // A link, unlike a rename, fails where the name is taken. Some file systems have none.
+            match fs::hard_link(&self.temporary, &self.target) {
+                // Dropping removes the other name.
+                Ok(()) => {}
+                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => return Err(exists(&self.target)),
+                Err(_) if fs::symlink_metadata(&self.target).is_ok() => return Err(exists(&self.target)),
+                Err(_) => fs::rename(&self.temporary, &self.target).map_err(refused)?,
+            }
         }
-        // A link, unlike a rename, fails where the name is taken. Some file systems have none.
-        match fs::hard_link(&self.temporary, &self.target) {
-            // Dropping removes the other name.
-            Ok(()) => Ok(()),
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Err(exists(&self.target)),
-            Err(_) if fs::symlink_metadata(&self.target).is_ok() => Err(exists(&self.target)),
-            Err(_) => fs::rename(&self.temporary, &self.target).map_err(refused),
-        }
+        Ok(())
     }
 }
 

@@ -7,6 +7,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+#[cfg(feature = "gpu")]
+pub(super) use self::render::{RenderArgs, ViewArgs};
 use super::values;
 use crate::light::{DEFAULT_SKY_DIRECTIONS, Sun};
 
@@ -28,6 +30,8 @@ pub(super) struct Cli {
 pub(super) enum Command {
     Info(InfoArgs),
     Preprocess(PreprocessArgs),
+    #[cfg(feature = "gpu")]
+    Render(Box<RenderArgs>),
     #[cfg(feature = "dem")]
     Synth(SynthArgs),
 }

@@ -6,6 +6,8 @@ mod info;
 mod input;
 mod preprocess;
 mod progress;
+#[cfg(feature = "gpu")]
+mod render;
 #[cfg(feature = "dem")]
 mod synth;
 mod values;
@@ -45,6 +47,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     status(match cli.command {
         Command::Info(args) => info::run(&args, &Terminal::new(args.quiet)),
         Command::Preprocess(args) => preprocess::run(&args, &Terminal::new(args.quiet)),
+        #[cfg(feature = "gpu")]
+        Command::Render(args) => render::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "dem")]
         Command::Synth(args) => synth::run(&args, &Terminal::new(args.quiet)),
     })

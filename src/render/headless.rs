@@ -241,6 +241,11 @@ impl Headless {
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
+    /// Width and height of the frames in pixels.
+    pub fn size_px(&self) -> [u32; 2] {
+        self.options.size_px
+    }
+
     /// The clipmap as of the last frame.
     pub fn clipmap(&self) -> &Clipmap {
         &self.clipmap

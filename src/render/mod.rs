@@ -2,5 +2,7 @@
 
 mod headless;
 pub mod pictures;
+mod recording;
 
 pub use headless::{COLOUR_FORMAT, Frame, Headless, HeadlessOptions};
+pub use recording::{Recording, picture};

@@ -18,7 +18,7 @@ mod synth;
 mod write;
 
 pub use georeference::{Georeference, Registration};
-pub use open::{open, open_bytes};
+pub use open::{open, open_bytes, open_file};
 pub use read_at::{Cursor, ReadAt};
 pub use synth::{MAX_SYNTH_SIZE, Synth};
 #[cfg(feature = "dem")]

@@ -28,6 +28,14 @@ const READ_HERE: &str = "give a GeoTIFF, a grey PNG, OpenEXR, SRTM .hgt or ESRI 
 /// # Errors
 /// One clear line where the file is missing, no plain file, empty, damaged, or of a kind that is not read.
 pub fn open(path: &Path) -> Result<Box<dyn HeightSource>> {
+    open_bytes(&path.display().to_string(), open_file(path)?)
+}
+
+/// The bytes of the file at `path`, read where they are asked for.
+///
+/// # Errors
+/// One clear line where the file is missing or no plain file.
+pub fn open_file(path: &Path) -> Result<Arc<dyn ReadAt>> {
     let name = path.display().to_string();
     let metadata = fs::metadata(path).map_err(|error| Error::io(&name, error))?;
     if metadata.is_dir() {
@@ -39,7 +47,7 @@ pub fn open(path: &Path) -> Result<Box<dyn HeightSource>> {
     let file = File::open(path)
         .and_then(OpenFile::new)
         .map_err(|error| Error::io(&name, error))?;
-    open_bytes(&name, Arc::new(file))
+    Ok(Arc::new(file))
 }
 
 /// Opens the DEM in `bytes`, which messages call `name`. The name's ending decides where the bytes do not, and

@@ -1,4 +1,5 @@
 //! What several test programs share: levels from a formula, a seeded generator, an adapter or a word of its absence.
+#![allow(clippy::print_stderr, reason = "a skipped test says so")]
 #![allow(unreachable_pub, reason = "a module of test programs has no outside")]
 #![allow(dead_code, reason = "each test program uses its own part of this")]
 

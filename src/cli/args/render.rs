@@ -78,9 +78,10 @@ pub(in crate::cli) struct ViewArgs {
     #[arg(long, value_name = "WxH", value_parser = view_values::size, default_value = "1280x720")]
     pub(in crate::cli) size: [u32; 2],
 
-    /// Samples along the side of a level's window, a power of two from 64 to 2048
-    #[arg(long, value_name = "N", value_parser = view_values::clip_size, default_value = "256")]
-    pub(in crate::cli) clip_size: i64,
+    /// Samples along the side of a level's window, a power of two from 64 to 2048 [default: 256; what
+    /// suits the picture's height where the whole DEM is shown]
+    #[arg(long, value_name = "N", value_parser = view_values::clip_size)]
+    pub(in crate::cli) clip_size: Option<i64>,
 
     /// Keep only the finest levels, this many
     #[arg(long, value_name = "L", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
@@ -148,7 +149,7 @@ mod tests {
         );
         assert_eq!(
             (args.view.size, args.view.clip_size, args.view.msaa),
-            ([1, 1], 256, 1)
+            ([1, 1], None, 1)
         );
         let args = parse("render a.exr --flight orbit --frames 0..3 --view level").unwrap();
         assert_eq!((args.frames, args.view.view), (Some(0..3), ViewMode::Level));

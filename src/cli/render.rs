@@ -1,0 +1,213 @@
+//! `clipscape render`: one picture, or the frames of a flight.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use super::Outcome;
+use super::args::{RenderArgs, ViewArgs};
+use super::input::beside;
+use super::progress::Terminal;
+use crate::build::Output;
+use crate::camera::{Camera, Flight, overview};
+use crate::clipmap::ClipmapOptions;
+use crate::error::{Error, ErrorKind, Result};
+use crate::gpu;
+use crate::levels::Levels;
+use crate::progress::Progress;
+use crate::render::{Headless, HeadlessOptions, Recording, picture};
+use crate::stats::{FrameStats, Run, SummaryStats};
+use crate::stream::Terrain;
+
+/// Vertical field of view where none is given, degrees.
+const FOV_DEG: f64 = 60.0;
+
+/// Clip size where none is given and the camera is among the terrain.
+const CLIP_SIZE: i64 = 256;
+
+/// What is drawn.
+enum Shot {
+    Picture(Camera),
+    Flight(Box<Flight>),
+}
+
+/// Runs the command.
+pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
+    // What can be refused at once is, before the terrain is read and its pyramid built.
+    let out = args.output.clone().unwrap_or_else(|| default_output(args));
+    let flight_file = args.flight.as_deref().filter(|f| *f != Path::new("orbit"));
+    let flight_json = flight_file.map(read_flight).transpose()?;
+    let ring = ClipmapOptions {
+        clip_size: clip_size(args),
+        transition: args.view.transition,
+        ..Default::default()
+    };
+    ring.ring()?;
+    let stats = args
+        .view
+        .stats
+        .as_deref()
+        .map(|path| Output::create(path, args.force))
+        .transpose()?;
+    let gpu = gpu::open()?;
+
+    let terrain = Terrain::open(&args.input.to_string_lossy(), terminal)?;
+    warn_of_sun(args, &terrain, terminal);
+    let mut headless = Headless::new(gpu, &terrain, &headless_options(&args.view, &terrain, &ring))?;
+    let [low, high] = headless
+        .clipmap()
+        .height_range_m()
+        .map(|h| f64::from(h) + terrain.grid().base_m);
+    let aspect = f64::from(args.view.size[0]) / f64::from(args.view.size[1]);
+    let shot = match (&flight_json, args.flight.is_some(), args.eye) {
+        (Some((name, json)), ..) => Shot::Flight(Box::new(Flight::parse(name, json)?)),
+        (None, true, _) => Shot::Flight(Box::new(Flight::orbit(terrain.grid(), low, high))),
+        (None, false, Some(eye)) => Shot::Picture(camera(args, eye)),
+        (None, false, None) => Shot::Picture(overview(terrain.grid(), low, high, aspect)),
+    };
+    let frames = match shot {
+        Shot::Picture(camera) => vec![picture(&out, args.force, &mut headless, &terrain, &camera)?],
+        Shot::Flight(flight) => {
+            let recording = Recording {
+                folder: out.clone(),
+                frames: args.frames.clone(),
+                contact_sheet: args.contact_sheet.clone(),
+                animation: args.animation.clone(),
+                force: args.force,
+            };
+            recording.record(&mut headless, &terrain, &flight, terminal)?
+        }
+    };
+    if let (Some((output, file)), Some(path)) = (stats, &args.view.stats) {
+        let flight_checksum = flight_json.as_ref().map(|(_, json)| checksum(json.as_bytes()));
+        let run = Run {
+            device: headless.gpu().info.name.clone(),
+            driver: headless.gpu().driver(),
+            command: std::env::args().collect::<Vec<_>>().join(" "),
+            flight_checksum,
+            input_checksum: file_checksum(&args.input)?,
+            faults: terrain.faults().len() as u64,
+        };
+        write_stats(&file, path, &frames, run)?;
+        output.publish(&file)?;
+    }
+    for fault in terrain.faults() {
+        terminal.warn(&fault.to_string());
+    }
+    let what = if frames.len() == 1 {
+        "1 frame".to_string()
+    } else {
+        format!("{} frames", frames.len())
+    };
+    terminal.note(&format!("{} holds {what}", out.display()));
+    Ok(())
+}
+
+fn default_output(args: &RenderArgs) -> PathBuf {
+    let ending = if args.flight.is_some() { "" } else { ".png" };
+    let out = beside(&args.input, ending);
+    // An input without an ending of its own is no folder for frames.
+    if out == args.input {
+        beside(&args.input, ".frames")
+    } else {
+        out
+    }
+}
+
+fn read_flight(path: &Path) -> Result<(String, String)> {
+    let name = path.display().to_string();
+    let json = fs::read_to_string(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::InvalidData => Error::new(ErrorKind::Broken, &name, "is no text, so no flight")
+            .advice("give a flight's JSON file, or `orbit`"),
+        _ => Error::io(&name, e),
+    })?;
+    Ok((name, json))
+}
+
+fn camera(args: &RenderArgs, eye: [f64; 3]) -> Camera {
+    Camera {
+        eye: eye.into(),
+        heading_deg: args.heading.unwrap_or(0.0),
+        pitch_deg: args.pitch.unwrap_or(0.0),
+        roll_deg: args.roll.unwrap_or(0.0),
+        fov_deg: args.fov.unwrap_or(FOV_DEG),
+    }
+}
+
+/// The clip size asked for, or one that suits the picture.
+///
+/// Where the whole DEM is shown from afar, a level is dropped once the climb exceeds its reach: with reach R = N/2 - 2
+/// and the camera a distance D away, steps of `1.25 D / R` remain. They are to be about two pixels of the picture,
+/// `2 D tan(fov/2) / height` each, at the overview's 45 degrees: N = 1.5 times the picture's height.
+fn clip_size(args: &RenderArgs) -> i64 {
+    let whole = args.eye.is_none() && args.flight.as_deref().is_none_or(|f| f == Path::new("orbit"));
+    match args.view.clip_size {
+        Some(asked) => asked,
+        None if whole => {
+            let wanted = 1.5 * f64::from(args.view.size[1]);
+            (1i64 << (wanted.log2().round() as u32)).clamp(CLIP_SIZE, 2048)
+        }
+        None => CLIP_SIZE,
+    }
+}
+
+fn headless_options(view: &ViewArgs, terrain: &Terrain, ring: &ClipmapOptions) -> HeadlessOptions {
+    // Traced light is that of its own sun; it moves only by preprocessing.
+    let sun = terrain.sun().or(view.sun).unwrap_or_default();
+    HeadlessOptions {
+        size_px: view.size,
+        sample_count: view.msaa,
+        view_mode: view.view,
+        tint: !view.no_tint,
+        haze: !view.no_haze,
+        traced_light: terrain.has_light(),
+        sun,
+        clipmap: ClipmapOptions {
+            levels: view.levels,
+            vertical_scale: view.vertical_scale,
+            cull: !view.no_cull,
+            ..*ring
+        },
+    }
+}
+
+fn warn_of_sun(args: &RenderArgs, terrain: &Terrain, terminal: &Terminal) {
+    if args.view.sun.is_some() && terrain.has_light() {
+        terminal.warn(&format!(
+            "{}: its light is traced already, so --sun changes nothing; preprocess the DEM with --sun instead",
+            terrain.name()
+        ));
+    }
+}
+
+fn write_stats(mut file: &fs::File, path: &Path, frames: &[FrameStats], run: Run) -> Result<()> {
+    let mut text = String::new();
+    for frame in frames {
+        text += &serde_json::to_string(frame).expect("numbers are valid JSON");
+        text.push('\n');
+    }
+    text +=
+        &serde_json::to_string(&SummaryStats::new(run, frames)).expect("numbers and texts are valid JSON");
+    text.push('\n');
+    file.write_all(text.as_bytes())
+        .map_err(|e| Error::io(path.display(), e))
+}
+
+fn checksum(bytes: &[u8]) -> String {
+    format!("crc32c:{:08x}", crc32c::crc32c(bytes))
+}
+
+/// The checksum of an input that is a file.
+fn file_checksum(path: &Path) -> Result<Option<String>> {
+    if path.to_str().is_some_and(|p| p.starts_with("synth:")) {
+        return Ok(None);
+    }
+    let mut file = fs::File::open(path).map_err(|e| Error::io(path.display(), e))?;
+    let (mut crc, mut buffer) = (0, vec![0; 1 << 20]);
+    loop {
+        match std::io::Read::read(&mut file, &mut buffer).map_err(|e| Error::io(path.display(), e))? {
+            0 => return Ok(Some(format!("crc32c:{crc:08x}"))),
+            n => crc = crc32c::crc32c_append(crc, &buffer[..n]),
+        }
+    }
+}
