@@ -265,8 +265,7 @@ fn errors_are_one_line_and_leave_nothing() {
 fn a_full_disk_is_one_line() {
     let hills = Hills::new(64, 64);
     // Writing to /dev/full fails as a full disk does; the writer is the one that `preprocess` uses.
-    let mut pyramid = build_pyramid(&hills, DEFAULT_LOBES, &Silent).unwrap();
-    pyramid.bound(&Serial, &Silent).unwrap();
+    let pyramid = build_pyramid(&hills, DEFAULT_LOBES, &Silent).unwrap();
     let meta = crate::terrain::testing::meta(hills.description.grid, false);
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let error = crate::terrain::write(full, &meta, &pyramid, &Serial, &Silent).unwrap_err();
