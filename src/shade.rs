@@ -97,7 +97,7 @@ pub const RELIEF_LEAST_M: f32 = 300.0;
 /// Height in metres by which the air's density falls to 1/e.
 pub const HAZE_SCALE_M: f32 = 8000.0;
 /// Extinction by wavelength at the lowest ground, per metre: blue scatters most.
-pub const HAZE_PER_M: Vec3 = Vec3::new(0.45e-5, 0.75e-5, 1.3e-5);
+pub const HAZE_PER_M: Vec3 = Vec3::new(0.36e-5, 0.58e-5, 1.0e-5);
 /// The sky at the horizon, which is also the colour of much air.
 pub const SKY_HORIZON: Vec3 = Vec3::new(0.75, 0.95, 1.20);
 /// The sky overhead.
