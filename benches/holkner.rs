@@ -6,7 +6,8 @@
 //! The small terrain is the middle 1024 x 1024 of the large one, so that where all windows lie inside it both draw the
 //! same picture (checked before any time is taken). The camera stands over the middle and looks north and a little
 //! down; Holkner's drew everything around it, so nothing is culled here either. All settings are drawn once a round,
-//! small and large in turn; printed are medians over the rounds, of frames drawn to completion without reading back.
+//! small and large in turn; printed are medians over the rounds, of frames drawn to completion without reading back; the
+//! ratio is the median of the rounds' own ratios, which a machine that slows down and recovers does not disturb.
 #![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
 use clipscape::camera::Camera;
@@ -95,10 +96,14 @@ impl Setting<'_> {
     }
 
     fn fps(&self) -> f64 {
-        let mut sorted = self.draw_ms.clone();
-        sorted.sort_by(f64::total_cmp);
-        1e3 / clipscape::stats::percentile(&sorted, 50.0)
+        1e3 / median(self.draw_ms.iter().copied())
     }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    clipscape::stats::percentile(&sorted, 50.0)
 }
 
 fn main() {

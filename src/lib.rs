@@ -62,3 +62,8 @@ pub mod cli;
 pub use camera::{Camera, Flight, View};
 pub use clipmap::{Clipmap, ClipmapOptions};
 pub use error::{Error, ErrorKind, Result};
+
+/// The README's library example, compiled as a test.
+#[cfg(all(doctest, feature = "gpu"))]
+#[doc = include_str!("../README.md")]
+pub struct Readme;
