@@ -94,7 +94,7 @@ fn surface_colour(in: Varyings, texel: vec4<f32>) -> vec3<f32> {
         let up = ((in.height - view.eye_height_m.x) - view.eye_height_m.y) * view.vertical_scale;
         let ray = vec3(in.from_eye.x * view.spacing_m.x, up, in.from_eye.y * view.spacing_m.y);
         let distance_m = length(ray);
-        let eye_m = view.eye_height_m.x - shade.low_m;
+        let eye_m = (view.eye_height_m.x - shade.low_m) * view.vertical_scale;
         let clear = transmission(distance_m, eye_m, eye_m + up);
         let level_ray = vec3(ray.x, 0.0, ray.z) / max(length(ray.xz), 1e-20);
         radiance = radiance * clear + sky_colour(level_ray) * (1.0 - clear);

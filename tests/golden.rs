@@ -182,6 +182,23 @@ fn the_bare_light_at_four_samples_a_pixel() {
 }
 
 #[test]
+fn light_from_slopes_where_none_was_traced() {
+    let sun = Sun {
+        azimuth_deg: 90.0,
+        altitude_deg: 30.0,
+    };
+    let options = HeadlessOptions {
+        traced_light: false,
+        sun,
+        ..options()
+    };
+    let Some(pixels) = draw(&options, &near()) else {
+        return;
+    };
+    compare("slopes", &pixels);
+}
+
+#[test]
 fn control_a_slightly_different_frame_is_caught() {
     let Some(pixels) = draw(&options(), &near()) else {
         return;

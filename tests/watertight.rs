@@ -2,13 +2,17 @@
 
 mod support;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use clipscape::camera::{Camera, View};
-use clipscape::clipmap::{Clipmap, ClipmapOptions, Instance, Vertex, displace};
+use clipscape::clipmap::{Clipmap, ClipmapOptions, Instance, Selection, Side, Vertex, displace};
 use clipscape::grid::{Grid, PATCH, Patch};
+use clipscape::levels::Levels;
+use clipscape::progress::Silent;
+use clipscape::pyramid::{Filter, Pyramid};
+use clipscape::work::Serial;
 use glam::DVec3;
-use support::{Formula, Random, hills, seed};
+use support::{Formula, Random, hash, hills, seed};
 
 type Hills = Formula<fn(u32, i64, i64) -> f32>;
 
@@ -132,6 +136,7 @@ fn faults(clipmap: &Clipmap, shader: &Clipmap) -> Vec<String> {
             }
         }
     }
+    faults.extend(closer_faults(clipmap.selection()));
     // (c): wherever children are drawn, alpha of their parent's level is 0 on the parent.
     for instance in clipmap.selection().instances() {
         if instance.level as usize + 1 == clipmap.windows().len() {
@@ -151,6 +156,52 @@ fn faults(clipmap: &Clipmap, shader: &Clipmap) -> Vec<String> {
         }
     }
     faults
+}
+
+/// A side is closed exactly where a patch of the next coarser level is drawn beyond it.
+fn closer_faults(selection: &Selection) -> Vec<String> {
+    let drawn: HashSet<_> = selection
+        .instances()
+        .map(|i| (i.level, i.origin.map(|o| i64::from(o) / PATCH)))
+        .collect();
+    let mut faults = Vec::new();
+    for instance in selection.instances() {
+        let [a, b] = instance.origin.map(|o| i64::from(o) / PATCH);
+        for (side, closers) in Side::ALL.into_iter().zip(&selection.closers) {
+            let (a, b) = match side {
+                Side::West => (a - 1, b),
+                Side::East => (a + 1, b),
+                Side::North => (a, b - 1),
+                Side::South => (a, b + 1),
+            };
+            let beyond = Patch::new(instance.level, a, b).parent();
+            let coarser = drawn.contains(&(beyond.level, [beyond.a, beyond.b]));
+            if coarser != closers.contains(instance) {
+                faults.push(format!(
+                    "closer: {side:?} of {instance:?} beside a coarser patch: {coarser}"
+                ));
+            }
+        }
+    }
+    faults
+}
+
+#[test]
+fn control_a_side_that_is_not_closed_is_caught() {
+    let seed = seed(9);
+    let mut random = Random(seed);
+    let mut caught = 0;
+    for _ in 0..40 {
+        let scene = scene(&mut random);
+        let mut clipmap = Clipmap::new(&scene.levels, &scene.options).unwrap();
+        clipmap.update(&scene.levels, &scene.view).unwrap();
+        let mut selection = clipmap.selection().clone();
+        selection.closers.swap(0, 1);
+        let sides = selection.closers[0].len() + selection.closers[1].len();
+        caught += u32::from(sides > 0 && !closer_faults(&selection).is_empty());
+    }
+    // Where all that is drawn is one level, no side is closed.
+    assert!(caught > 8, "seed {seed}: {caught} of 40");
 }
 
 #[test]
@@ -209,29 +260,68 @@ fn control_a_selection_that_lags_behind_the_shader_is_caught() {
         moved.update(&scene.levels, &scene.view).unwrap();
         caught += u32::from(!faults(&clipmap, &moved).is_empty());
     }
-    assert!(caught > 15, "seed {seed}: {caught} of 40");
+    // Where all that is drawn is one level, there is nothing to contradict.
+    assert!(caught > 10, "seed {seed}: {caught} of 40");
+}
+
+/// A pyramid with its own saturated bounds: rough ground with voids.
+fn rough(width: i64, height: i64) -> Pyramid {
+    let grid = Grid::new(width, height, [20.0, 30.0]);
+    let heights = grid.size.rect().cells().map(|(i, j)| {
+        let void = hash(9, i / 16, j / 16) < 0.1;
+        if void {
+            f32::NAN
+        } else {
+            hills(0, i, j) + 400.0 * hash(0, i, j) as f32
+        }
+    });
+    let mut pyramid = Pyramid::new(
+        grid,
+        heights.collect(),
+        None,
+        &Filter::default(),
+        &Serial,
+        &Silent,
+    )
+    .unwrap();
+    pyramid.bound(&Serial, &Silent).unwrap();
+    pyramid
 }
 
 #[test]
 fn culling_leaves_out_only_what_is_not_seen() {
     let seed = seed(8);
     let mut random = Random(seed);
+    let terrains = [rough(900, 700), rough(333, 1201)];
     let mut dropped = 0;
-    for k in 0..60 {
-        let mut scene = scene(&mut random);
-        scene.view.camera.heading_deg = random.uniform(0.0, 360.0);
-        scene.view.camera.pitch_deg = random.uniform(-90.0, 10.0);
+    for k in 0..80 {
+        let scene = scene(&mut random);
+        let levels = &terrains[k % 2];
+        let size = levels.grid().size;
+        let scale = random.pick(&[1.0, 1.0, 0.0, -2.0, 10.0]);
+        let camera = Camera {
+            eye: DVec3::new(
+                random.uniform(-0.1, 1.1) * size.width as f64 * 20.0,
+                random.pick(&[-100.0, 50.0, 500.0, 4000.0]),
+                random.uniform(-0.1, 1.1) * size.height as f64 * 30.0,
+            ),
+            heading_deg: random.uniform(0.0, 360.0),
+            pitch_deg: random.uniform(-90.0, 10.0),
+            ..scene.view.camera
+        };
+        let view = View::new(camera, [64, 64]).unwrap();
         let draw = |cull| {
             let options = ClipmapOptions {
                 cull,
+                vertical_scale: scale,
                 ..scene.options
             };
-            let mut clipmap = Clipmap::new(&scene.levels, &options).unwrap();
-            clipmap.update(&scene.levels, &scene.view).unwrap();
+            let mut clipmap = Clipmap::new(levels, &options).unwrap();
+            clipmap.update(levels, &view).unwrap();
             clipmap
         };
-        let (all, seen) = (draw(false), draw(true));
-        let seen: std::collections::HashSet<_> = seen
+        let (all, culled) = (draw(false), draw(true));
+        let seen: HashSet<_> = culled
             .selection()
             .instances()
             .map(|i| (i.level, i.origin))
@@ -243,16 +333,20 @@ fn culling_leaves_out_only_what_is_not_seen() {
         {
             dropped += 1;
             // All of its vertices lie outside one and the same plane of the frustum.
-            let clips: Vec<_> = (0..81)
-                .map(|k| displace(&all, instance, k % 9, k / 9).clip)
-                .collect();
+            let vertices = (0..81)
+                .map(|k| displace(&all, instance, k % 9, k / 9))
+                .filter(|v| !v.void);
+            let clips: Vec<_> = vertices.map(|v| v.clip).collect();
             let outside = |test: fn(&[f32; 4]) -> bool| clips.iter().all(test);
             let unseen = outside(|c| c[3] < 0.0)
                 || outside(|c| c[0] > c[3])
                 || outside(|c| c[0] < -c[3])
                 || outside(|c| c[1] > c[3])
                 || outside(|c| c[1] < -c[3]);
-            assert!(unseen, "seed {seed}, scene {k}: {instance:?} is seen");
+            assert!(
+                unseen,
+                "seed {seed}, scene {k}, scale {scale}: {instance:?} is seen"
+            );
         }
     }
     assert!(dropped > 1000, "only {dropped} patches were dropped");

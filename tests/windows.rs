@@ -250,3 +250,34 @@ fn a_source_that_fails_leaves_a_window_that_heals() {
         }
     }
 }
+
+#[test]
+fn slopes_have_the_ramp_s_direction_and_size_on_every_level() {
+    // Rises by 0.5 to the east and falls by 0.25 to the south, over columns and rows of unlike spacing.
+    let grid = Grid::new(500, 400, [4.0, 10.0]);
+    let ramp = |l: u32, i: i64, j: i64| (0.5 * 4.0 * (i << l) as f64 - 0.25 * 10.0 * (j << l) as f64) as f32;
+    let levels = Formula::new(grid, ramp);
+    let mut clipmap = Clipmap::new(
+        &levels,
+        &ClipmapOptions {
+            clip_size: 64,
+            ..Default::default()
+        },
+    )
+    .unwrap();
+    clipmap.update(&levels, &view(900.0, 1700.0)).unwrap();
+    assert!(clipmap.windows().len() >= 4);
+    for window in clipmap.windows() {
+        assert!(!window.light_resident().is_empty());
+        for (i, j) in window.light_resident().cells() {
+            let [x, z] = window.light_slot_of(i, j);
+            let texel = window.light()[(z * window.light_size() + x) as usize];
+            assert_eq!(
+                [texel[2].to_f32(), texel[3].to_f32()],
+                [0.5, -0.25],
+                "level {}: ({i}, {j})",
+                window.level()
+            );
+        }
+    }
+}

@@ -7,22 +7,27 @@ use crate::grid::{Grid, Size};
 pub const DEFAULT_MEMORY_BYTES: u64 = 2 << 30;
 
 /// Bytes a sample of level 0 takes at the peak: heights of all levels and their bounds alone (measured at 4096 x
-/// 4096: 6.8), or light and what tracing and filtering it take as well (22.3).
-const BYTES_A_SAMPLE: u64 = 8;
-const BYTES_A_SAMPLE_WITH_LIGHT: u64 = 26;
+/// 4096 over a source that holds nothing: 6.8), or light and what tracing and filtering it take as well (22.3); and 4
+/// for a source that holds its heights.
+const BYTES_A_SAMPLE: u64 = 12;
+const BYTES_A_SAMPLE_WITH_LIGHT: u64 = 30;
+
+/// Bytes a column or row takes while light is traced: the table of a ray's crossings with cell edges.
+const BYTES_A_LINE_WITH_LIGHT: u64 = 192;
 
 /// What does not depend on the DEM: the program, and tiles being compressed.
 const FIXED_BYTES: u64 = 64 << 20;
 
 /// The memory that preprocessing a DEM of `grid` takes, in bytes.
 pub fn needed_bytes(grid: &Grid, light: bool) -> u64 {
-    let a_sample = if light {
-        BYTES_A_SAMPLE_WITH_LIGHT
+    let (a_sample, a_line) = if light {
+        (BYTES_A_SAMPLE_WITH_LIGHT, BYTES_A_LINE_WITH_LIGHT)
     } else {
-        BYTES_A_SAMPLE
+        (BYTES_A_SAMPLE, 0)
     };
     (grid.size.samples() as u64)
         .saturating_mul(a_sample)
+        .saturating_add((grid.size.width + grid.size.height) as u64 * a_line)
         .saturating_add(FIXED_BYTES)
 }
 

@@ -14,6 +14,6 @@ mod threads;
 
 pub use crate::terrain::SourceStamp;
 pub use memory::{DEFAULT_MEMORY_BYTES, needed_bytes, peak_rss_bytes};
-pub use output::Output;
+pub use output::{Output, refuse_existing};
 pub use preprocess::{PreprocessOptions, PreprocessReport, build_pyramid, preprocess};
 pub use threads::Threads;

@@ -112,6 +112,18 @@ impl Drop for Output {
     }
 }
 
+/// Refuses a target that exists, for whoever will be writing it much later.
+///
+/// # Errors
+/// [`ErrorKind::Misuse`] where it exists.
+pub fn refuse_existing(target: &Path) -> Result<()> {
+    if fs::symlink_metadata(target).is_ok() {
+        Err(exists(target))
+    } else {
+        Ok(())
+    }
+}
+
 fn exists(target: &Path) -> Error {
     Error::new(ErrorKind::Misuse, target.display(), "exists already")
         .advice("use --force to replace it, or choose another name")

@@ -8,11 +8,12 @@ use super::Outcome;
 use super::args::{RenderArgs, ViewArgs};
 use super::input::beside;
 use super::progress::Terminal;
-use crate::build::Output;
+use crate::build::{Output, refuse_existing};
 use crate::camera::{Camera, Flight, overview};
 use crate::clipmap::ClipmapOptions;
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu;
+use crate::grid::Grid;
 use crate::levels::Levels;
 use crate::progress::Progress;
 use crate::render::{Headless, HeadlessOptions, Recording, picture};
@@ -25,18 +26,34 @@ const FOV_DEG: f64 = 60.0;
 /// Clip size where none is given and the camera is among the terrain.
 const CLIP_SIZE: i64 = 256;
 
-/// What is drawn.
-enum Shot {
-    Picture(Camera),
-    Flight(Box<Flight>),
-}
-
 /// Runs the command.
 pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     // What can be refused at once is, before the terrain is read and its pyramid built.
     let out = args.output.clone().unwrap_or_else(|| default_output(args));
     let flight_file = args.flight.as_deref().filter(|f| *f != Path::new("orbit"));
     let flight_json = flight_file.map(read_flight).transpose()?;
+    let flight = flight_json
+        .as_ref()
+        .map(|(name, json)| Flight::parse(name, json))
+        .transpose()?;
+    let recording = Recording {
+        folder: out.clone(),
+        frames: args.frames.clone(),
+        contact_sheet: args.contact_sheet.clone(),
+        animation: args.animation.clone(),
+        force: args.force,
+    };
+    match (&flight, args.flight.is_some()) {
+        (Some(flight), _) => {
+            recording.check(flight)?;
+        }
+        (None, true) => {
+            // An orbit has the same frames around any DEM.
+            recording.check(&Flight::orbit(&Grid::new(2, 2, [1.0, 1.0]), 0.0, 0.0))?;
+        }
+        (None, false) if !args.force => refuse_existing(&out)?,
+        (None, false) => {}
+    }
     let ring = ClipmapOptions {
         clip_size: clip_size(args),
         transition: args.view.transition,
@@ -51,7 +68,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         .transpose()?;
     let gpu = gpu::open()?;
 
-    let terrain = Terrain::open(&args.input.to_string_lossy(), terminal)?;
+    let terrain = Terrain::open(&args.input, terminal)?;
     warn_of_sun(args, &terrain, terminal);
     let mut headless = Headless::new(gpu, &terrain, &headless_options(&args.view, &terrain, &ring))?;
     let [low, high] = headless
@@ -59,39 +76,34 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         .height_range_m()
         .map(|h| f64::from(h) + terrain.grid().base_m);
     let aspect = f64::from(args.view.size[0]) / f64::from(args.view.size[1]);
-    let shot = match (&flight_json, args.flight.is_some(), args.eye) {
-        (Some((name, json)), ..) => Shot::Flight(Box::new(Flight::parse(name, json)?)),
-        (None, true, _) => Shot::Flight(Box::new(Flight::orbit(terrain.grid(), low, high))),
-        (None, false, Some(eye)) => Shot::Picture(camera(args, eye)),
-        (None, false, None) => Shot::Picture(overview(terrain.grid(), low, high, aspect)),
-    };
-    let frames = match shot {
-        Shot::Picture(camera) => vec![picture(&out, args.force, &mut headless, &terrain, &camera)?],
-        Shot::Flight(flight) => {
-            let recording = Recording {
-                folder: out.clone(),
-                frames: args.frames.clone(),
-                contact_sheet: args.contact_sheet.clone(),
-                animation: args.animation.clone(),
-                force: args.force,
+    let frames = match (flight, args.flight.is_some(), args.eye) {
+        (Some(flight), ..) => recording.record(&mut headless, &terrain, &flight, terminal)?,
+        (None, true, _) => {
+            let orbit = Flight::orbit(terrain.grid(), low, high);
+            recording.record(&mut headless, &terrain, &orbit, terminal)?
+        }
+        (None, false, eye) => {
+            let camera = match eye {
+                Some(eye) => camera(args, eye),
+                None => overview(terrain.grid(), low, high, aspect),
             };
-            recording.record(&mut headless, &terrain, &flight, terminal)?
+            vec![picture(&out, args.force, &mut headless, &terrain, &camera)?]
         }
     };
+    let faults = terrain.faults();
     if let (Some((output, file)), Some(path)) = (stats, &args.view.stats) {
-        let flight_checksum = flight_json.as_ref().map(|(_, json)| checksum(json.as_bytes()));
         let run = Run {
             device: headless.gpu().info.name.clone(),
             driver: headless.gpu().driver(),
-            command: std::env::args().collect::<Vec<_>>().join(" "),
-            flight_checksum,
+            command: command_line(),
+            flight_checksum: flight_json.as_ref().map(|(_, json)| checksum(json.as_bytes())),
             input_checksum: file_checksum(&args.input)?,
-            faults: terrain.faults().len() as u64,
+            faults: faults.len() as u64,
         };
         write_stats(&file, path, &frames, run)?;
         output.publish(&file)?;
     }
-    for fault in terrain.faults() {
+    for fault in faults {
         terminal.warn(&fault.to_string());
     }
     let what = if frames.len() == 1 {
@@ -101,6 +113,14 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     };
     terminal.note(&format!("{} holds {what}", out.display()));
     Ok(())
+}
+
+/// The command line as one line, whatever its arguments are made of.
+fn command_line() -> String {
+    let arguments: Vec<_> = std::env::args_os()
+        .map(|a| a.to_string_lossy().into_owned())
+        .collect();
+    arguments.join(" ")
 }
 
 fn default_output(args: &RenderArgs) -> PathBuf {

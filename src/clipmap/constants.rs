@@ -6,6 +6,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::Eye;
 use crate::camera::View;
+use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, MAX_LEVELS, PATCH, slot};
 
 /// A void height on the GPU: finite, because shading languages may assume that NaN never occurs.
@@ -80,6 +81,30 @@ pub struct Ring {
 }
 
 impl Ring {
+    /// Refuses a clip size that is no power of two in range, and a transition beyond its limit.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`], naming the value and what is allowed.
+    pub fn check(&self) -> Result<()> {
+        let misuse = |subject: &str, what: String, advice: String| {
+            Err(Error::new(ErrorKind::Misuse, subject, what).advice(advice))
+        };
+        let n = self.clip_size;
+        if !(64..=2048).contains(&n) || n & (n - 1) != 0 {
+            return misuse(
+                "clip size",
+                format!("{n} samples"),
+                "use 64, 128, 256, 512, 1024 or 2048".to_string(),
+            );
+        }
+        let limit = Self::transition_limit(n);
+        if !(0..=limit).contains(&self.transition) {
+            let advice = format!("a clip size of {n} allows 0 to {limit}");
+            return misuse("transition", format!("{} steps", self.transition), advice);
+        }
+        Ok(())
+    }
+
     /// A level's reach in its own steps.
     pub fn reach(&self) -> i64 {
         self.clip_size / 2 - 2

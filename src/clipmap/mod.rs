@@ -71,7 +71,7 @@ impl ClipmapOptions {
             clip_size: self.clip_size,
             transition,
         };
-        plan::check(&ring)?;
+        ring.check()?;
         Ok(ring)
     }
 }
@@ -218,7 +218,11 @@ impl Clipmap {
             patches_culled: self.selection.culled,
             triangles: self.selection.triangles(),
             levels_drawn: self.selection.levels.count_ones(),
-            complete: true,
+            complete: self
+                .plan
+                .levels()
+                .iter()
+                .all(|p| self.windows[p.level as usize].resident() == p.to),
             cut: self.cut,
         };
         Ok(&self.report)

@@ -1,6 +1,5 @@
 //! `UpdatePlan`: for each level the rectangles that cover exactly what a move of its window exposes.
 
-use super::constants::Ring;
 use super::eye::Eye;
 use super::window::{LightTexel, Window};
 use crate::grid::Rect;
@@ -100,28 +99,4 @@ pub fn exposed_bytes(level: u32, from: Rect, to: Rect, light_level_size: crate::
     };
     let light_from = if from.is_empty() { Rect::EMPTY } else { light(from) };
     fresh(from, to) * HEIGHT_BYTES + fresh(light_from, light(to)) * LIGHT_BYTES
-}
-
-/// Whether a ring's windows can hold levels of a DEM at all: a power of two in range, a transition within its limit.
-///
-/// # Errors
-/// [`crate::ErrorKind::Misuse`], naming the value and what is allowed.
-pub(super) fn check(ring: &Ring) -> crate::Result<()> {
-    let misuse = |subject: &str, what: String, advice: String| {
-        Err(crate::Error::new(crate::ErrorKind::Misuse, subject, what).advice(advice))
-    };
-    let n = ring.clip_size;
-    if !(64..=2048).contains(&n) || n & (n - 1) != 0 {
-        return misuse(
-            "clip size",
-            format!("{n} samples"),
-            "use 64, 128, 256, 512, 1024 or 2048".to_string(),
-        );
-    }
-    let limit = Ring::transition_limit(n);
-    if !(0..=limit).contains(&ring.transition) {
-        let advice = format!("a clip size of {n} allows 0 to {limit}");
-        return misuse("transition", format!("{} steps", ring.transition), advice);
-    }
-    Ok(())
 }

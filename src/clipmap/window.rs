@@ -2,7 +2,7 @@
 
 use half::f16;
 
-use super::constants::{Ring, light_level};
+use super::constants::{Ring, VOID_HEIGHT, light_level};
 use super::eye::Eye;
 use super::relief;
 use crate::error::Result;
@@ -189,6 +189,12 @@ impl Window {
         for &rect in heights {
             scratch.heights.resize(rect.area() as usize, 0.0);
             arrived(source.heights(self.level, rect, &mut scratch.heights)?)?;
+            // A source of the caller's own may not know what stands for no data on the GPU.
+            scratch
+                .heights
+                .iter_mut()
+                .filter(|h| **h == VOID_HEIGHT)
+                .for_each(|h| *h = f32::NAN);
             let first = self.index(rect.x0, rect.z0);
             copy_rows(&scratch.heights, &mut self.heights[first..], rect, self.n);
         }

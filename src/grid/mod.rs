@@ -19,6 +19,9 @@ pub const MAX_LEVELS: u32 = 32;
 /// The greatest width and height of a DEM in samples: the GPU addresses samples of one DEM in i32.
 pub const MAX_SIZE: i64 = 1 << 30;
 
+/// The greatest index offset in samples: indices beside it still fit i64 with room to spare.
+const MAX_OFFSET: u64 = 1 << 60;
+
 /// A file holds levels from 0 to the first of at most this many samples a side.
 pub const COARSEST: i64 = 64;
 
@@ -127,6 +130,10 @@ impl Grid {
             let [dx, dz] = self.spacing_m;
             return Err(format!("a spacing of {dx} x {dz} m is not above 0 and finite"));
         }
+        if self.offset.iter().any(|o| o.unsigned_abs() > MAX_OFFSET) {
+            let [x, z] = self.offset;
+            return Err(format!("an index offset of {x}, {z} is beyond 2^60 samples"));
+        }
         if !self.base_m.is_finite() {
             return Err(format!("a base height of {} m is not finite", self.base_m));
         }
@@ -176,5 +183,10 @@ mod tests {
         assert!(Grid::new(5, 5, [f64::NAN, 1.0]).check().is_err());
         assert!(Grid::new(5, 5, [1.0, 0.0]).check().is_err());
         assert!(Grid::new(5, 5, [1e-3, 1e6]).check().is_ok());
+        let shifted = |x| Grid {
+            offset: [x, 0],
+            ..Grid::new(5, 5, [1.0, 1.0])
+        };
+        assert!(shifted(i64::MIN).check().is_err() && shifted(-(1 << 60)).check().is_ok());
     }
 }

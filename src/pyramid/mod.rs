@@ -74,7 +74,8 @@ impl Pyramid {
         };
         let mut heights = heights;
         for h in &mut heights {
-            if h.is_infinite() {
+            // The least f32 stands for no data on the GPU, and no ground is that deep.
+            if h.is_infinite() || *h == f32::MIN {
                 *h = f32::NAN;
             }
         }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::headless::{Frame, Headless};
 use super::pictures::{Animation, ContactSheet, write_png};
+use crate::build::{Output, refuse_existing};
 use crate::camera::{Camera, Flight};
 use crate::error::{Error, ErrorKind, Result};
 use crate::levels::Levels;
@@ -36,8 +37,8 @@ impl Recording {
     /// Frames that were written stay where a later one fails; the contact sheet and the animation appear whole or not.
     ///
     /// # Errors
-    /// [`ErrorKind::Misuse`] for frames that the flight does not have and for files that exist, before anything is
-    /// drawn; those of drawing and writing; [`ErrorKind::Cancelled`].
+    /// Those of [`Recording::check`], before anything is drawn; those of drawing and writing;
+    /// [`ErrorKind::Cancelled`].
     pub fn record(
         &self,
         headless: &mut Headless,
@@ -48,6 +49,10 @@ impl Recording {
         let frames = self.check(flight)?;
         fs::create_dir_all(&self.folder).map_err(|e| folder_error(&self.folder, e))?;
         let [width, height] = headless.size_px();
+        if let Some(path) = &self.contact_sheet {
+            // It is written last: whether it can be is better known first.
+            drop(Output::create(path, self.force)?);
+        }
         let count = frames.end - frames.start;
         let mut sheet = self
             .contact_sheet
@@ -93,8 +98,11 @@ impl Recording {
         Ok(stats)
     }
 
-    /// The frames to draw, once nothing stands in their way.
-    fn check(&self, flight: &Flight) -> Result<Range<u64>> {
+    /// The frames to draw, once nothing stands in their way; for whoever wants to know before a long preparation.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] for frames that the flight does not have and for files that exist.
+    pub fn check(&self, flight: &Flight) -> Result<Range<u64>> {
         let all = 0..flight.frame_count();
         let frames = self.frames.clone().unwrap_or_else(|| all.clone());
         if frames.is_empty() || frames.end > all.end {
@@ -141,14 +149,6 @@ pub fn picture(
     let [width, height] = headless.size_px();
     write_png(path, width, height, &frame.rgba8)?;
     Ok(frame_stats(&frame, 0, 0.0, camera))
-}
-
-fn refuse_existing(path: &Path) -> Result<()> {
-    if fs::symlink_metadata(path).is_err() {
-        return Ok(());
-    }
-    Err(Error::new(ErrorKind::Misuse, path.display(), "exists already")
-        .advice("use --force to replace it, or choose another name"))
 }
 
 fn folder_error(folder: &Path, error: std::io::Error) -> Error {

@@ -46,12 +46,13 @@ impl Terrain {
     ///
     /// # Errors
     /// Where the input is missing, damaged, of a kind that is not read, or too large to be held.
-    pub fn open(input: &str, progress: &dyn Progress) -> Result<Self> {
-        if let Some(synth) = Synth::parse(input) {
+    pub fn open(input: impl AsRef<Path>, progress: &dyn Progress) -> Result<Self> {
+        let path = input.as_ref();
+        if let Some(synth) = path.to_str().and_then(Synth::parse) {
             return Ok(Self::from_synth(synth?));
         }
-        let bytes = source::open_file(Path::new(input))?;
-        Self::from_bytes(input, bytes, progress)
+        let bytes = source::open_file(path)?;
+        Self::from_bytes(&path.display().to_string(), bytes, progress)
     }
 
     /// The terrain in `bytes`: a terrain file's or a DEM file's. `name` is how messages speak of it, and its

@@ -22,6 +22,7 @@ use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use crate::grid::{Grid, Size};
+use crate::light::Sun;
 use crate::source::{Georeference, Registration};
 
 /// What every attribute's name begins with.
@@ -168,11 +169,18 @@ impl Meta {
         };
         let light = match read.optional::<Pair<f64>>("sun")? {
             None => None,
-            Some(Pair([sun_azimuth_deg, sun_altitude_deg])) => Some(LightMeta {
-                sun_azimuth_deg,
-                sun_altitude_deg,
-                sky_directions: read.required("sky_directions")?,
-            }),
+            Some(Pair([sun_azimuth_deg, sun_altitude_deg])) => {
+                let sun = Sun {
+                    azimuth_deg: sun_azimuth_deg,
+                    altitude_deg: sun_altitude_deg,
+                };
+                sun.check().map_err(|e| format!("clipscape.sun: {e}"))?;
+                Some(LightMeta {
+                    sun_azimuth_deg,
+                    sun_altitude_deg,
+                    sky_directions: read.required("sky_directions")?,
+                })
+            }
         };
         let meta = Self {
             grid: Grid {
@@ -272,7 +280,7 @@ mod tests {
         bare.source = SourceStamp::default();
         bare.rounding_step_m = None;
         bare.grid.base_m = -1.0e-300;
-        bare.grid.offset = [i64::MIN, i64::MAX];
+        bare.grid.offset = [-(1 << 60), 1 << 60];
         assert_eq!(
             Meta::from_attributes(&bare.to_attributes(), bare.grid.size).unwrap(),
             bare

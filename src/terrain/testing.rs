@@ -51,6 +51,13 @@ impl Arrays {
         let bounds = (0..levels).map(|l| {
             let bounds = |random: &mut Random| match random.below(6) {
                 0 => Bounds::VOID,
+                // Void itself, over valid ground of finer levels.
+                1 => Bounds {
+                    need_min: -7.5,
+                    need_max: 1000.0 * random.unit() as f32,
+                    need_error: 3.25,
+                    ..Bounds::VOID
+                },
                 _ => bytemuck::cast([0; 6].map(|_: u32| 1000.0 * random.unit() as f32)),
             };
             (0..grid.patches(l).samples()).map(|_| bounds(random)).collect()

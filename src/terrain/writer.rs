@@ -302,10 +302,12 @@ fn decode_levels(part: &Part, rect: Rect, levels: &dyn Levels) -> Option<Result<
         Kind::Bounds => {
             let mut bounds = vec![Bounds::VOID; count];
             let arrival = levels.bounds(part.level, rect, &mut bounds);
-            bounds
+            // One NaN here too, field by field: a void patch may have saturated bounds.
+            let fields: &mut [f32] = bytemuck::cast_slice_mut(&mut bounds);
+            fields
                 .iter_mut()
-                .filter(|b| b.is_void())
-                .for_each(|b| *b = Bounds::VOID);
+                .filter(|f| f.is_nan())
+                .for_each(|f| *f = f32::NAN);
             let samples: &[[f32; 6]] = bytemuck::cast_slice(&bounds);
             Some(arrived(arrival, &|| pack(samples, width, BOUNDS_FIELDS)))
         }

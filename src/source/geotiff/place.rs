@@ -137,6 +137,9 @@ pub(super) fn locate(name: &str, tiff: &mut Tiff, size: Size) -> Result<Located>
         located.assumed.push(sentence);
     } else {
         let metres = keys.metres(name, &mut located.assumed)?;
+        if place.crs.is_some() {
+            located.assumed.push(geographic::GRID_NORTH_ASSUMED.into());
+        }
         located.spacing_m = [px * metres, py.abs() * metres];
     }
     located.place = Some(place);

@@ -363,7 +363,7 @@ fn wide_values_get_a_base_and_scale_offset_and_unit_become_metres() {
         (d.step_m, d.vertical_unit.as_str(), d.grid.base_m),
         (Some(0.5 * 0.3048), "foot", 0.0)
     );
-    assert!(d.assumed.is_empty(), "{:?}", d.assumed);
+    assert_eq!(d.assumed, ["Grid north is taken for true north."]);
 }
 
 #[test]
