@@ -217,6 +217,36 @@ fn control_a_slightly_different_frame_is_caught() {
     assert!(mean > MEAN_LIMIT || far > FAR_SHARE_LIMIT, "{mean} {far}");
 }
 
+/// Frames of the shipped flight in which triangles that close a side cover a pixel, by clip size.
+const CLOSED: [(i64, u64); 7] = [
+    (256, 23),
+    (64, 10),
+    (64, 83),
+    (64, 91),
+    (64, 93),
+    (64, 95),
+    (64, 115),
+];
+
+#[test]
+fn what_closing_triangles_cover_is_coloured_like_the_ground_beside_it() {
+    let Some(gpu) = gpu() else { return };
+    let json = std::fs::read_to_string("data/pyrenees.json").unwrap();
+    let flight = clipscape::Flight::parse("data/pyrenees.json", &json).unwrap();
+    for (clip_size, k) in CLOSED {
+        let mut options = HeadlessOptions {
+            size_px: [1280, 720],
+            ..options()
+        };
+        options.clipmap.clip_size = clip_size;
+        let mut headless = Headless::new(gpu.clone(), pyrenees(), &options).unwrap();
+        let frame = headless.frame(pyrenees(), &flight.camera_at_frame(k)).unwrap();
+        // Neither sky nor ground is ever black.
+        let black = frame.rgba8.chunks(4).filter(|p| p[..3] == [0, 0, 0]).count();
+        assert_eq!(black, 0, "frame {k}, clip size {clip_size}");
+    }
+}
+
 #[test]
 fn frames_are_the_same_bytes_from_run_to_run_and_without_culling() {
     let Some(pixels) = draw(&options(), &near()) else {

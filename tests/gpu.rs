@@ -463,3 +463,60 @@ fn drawn_depths_equal_those_of_the_twin_s_triangles() {
         assert!(nearer.count() > covered / 2);
     }
 }
+
+/// Pixels of terrain that are darker than any ground in the light view can be.
+fn too_dark(rgba8: &[u8], depth: &[f32]) -> usize {
+    // The sky's share is at least a half: 0.2 x 0.5 in linear light is 89 of 255.
+    rgba8
+        .chunks(4)
+        .zip(depth)
+        .filter(|(p, d)| **d > 0.0 && p[..3].iter().any(|c| *c < 85))
+        .count()
+}
+
+#[test]
+fn closing_triangles_are_coloured_like_the_ground_beside_them() {
+    let Some(gpu) = gpu() else { return };
+    let mut bare = levels(900, 700);
+    bare.height = hills;
+    let light = HeadlessOptions {
+        view_mode: ViewMode::Light,
+        traced_light: false,
+        ..options(64, [320, 240])
+    };
+    let mut headless = Headless::new(gpu, &bare, &light).unwrap();
+    let seed = seed(10);
+    let mut random = Random(seed);
+    let (mut closers, mut pixels) = (0, 0);
+    for k in 0..100 {
+        // Low enough that several levels are seen, and the borders between them.
+        let mut camera = camera(&mut random, &bare.grid);
+        camera.eye.y = random.uniform(250.0, 900.0);
+        camera.pitch_deg = random.uniform(-50.0, -5.0);
+        let mut frame = headless.frame(&bare, &camera).unwrap();
+        let depth = headless.read_depth().unwrap();
+        closers += headless
+            .clipmap()
+            .selection()
+            .closers
+            .iter()
+            .map(Vec::len)
+            .sum::<usize>();
+        let ground = depth.iter().filter(|d| **d > 0.0).count();
+        pixels += ground;
+        assert_eq!(
+            too_dark(&frame.rgba8, &depth),
+            0,
+            "seed {seed}, camera {k} {camera:?}"
+        );
+        // Control: one black pixel among them is seen.
+        if let Some(at) = depth.iter().position(|d| *d > 0.0) {
+            frame.rgba8[4 * at..4 * at + 3].fill(0);
+            assert_eq!(too_dark(&frame.rgba8, &depth), 1);
+        }
+    }
+    assert!(
+        closers > 1000 && pixels > 500_000,
+        "{closers} sides closed, {pixels} pixels"
+    );
+}

@@ -102,12 +102,14 @@ fn mirrored_structs_have_the_layout_that_shaders_read() {
         spacing_m,
         eye_height_m,
         edge,
+        size_px,
         vertical_scale,
         near_m,
         reach,
         transition,
         slot_mask,
         held_mask,
+        padding,
     });
     assert_eq!(ours, layout(&terrain, "ViewConstants"));
     let ours = our_layout!(LevelConstants {

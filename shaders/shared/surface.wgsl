@@ -12,12 +12,14 @@ struct ViewConstants {
     spacing_m: vec2<f32>,       // metres between columns and rows of level 0
     eye_height_m: vec2<f32>,    // above the DEM's base: a high and a low part
     edge: vec2<f32>,            // samples from the eye to the DEM's last column and row
+    size_px: vec2<f32>,         // of the picture
     vertical_scale: f32,
     near_m: f32,                // nearest drawn distance, which is clip z
     reach: f32,                 // R, in steps of a level
     transition: f32,            // T, in steps of a level
     slot_mask: i32,             // clip size - 1
     held_mask: i32,             // slots along a side of the held field - 1
+    padding: vec2<f32>,
 }
 
 struct LevelConstants {

@@ -35,6 +35,8 @@ pub struct ViewConstants {
     pub eye_height_m: [f32; 2],
     /// Samples from the eye to the DEM's last column and row.
     pub edge: [f32; 2],
+    /// Width and height of the picture in pixels.
+    pub size_px: [f32; 2],
     /// Factor on heights relative to the eye.
     pub vertical_scale: f32,
     /// Nearest drawn distance in metres, which is clip z.
@@ -47,6 +49,8 @@ pub struct ViewConstants {
     pub slot_mask: i32,
     /// Slots along a side of the held field's grids, less one.
     pub held_mask: i32,
+    /// Fills the struct to the multiple of 16 bytes that shaders expect.
+    pub padding: [f32; 2],
 }
 
 /// Constants of a level.
@@ -151,12 +155,14 @@ impl ViewConstants {
             spacing_m: grid.spacing_m.map(|s| s as f32),
             eye_height_m: eye.height_high_low(),
             edge: [edge(0, grid.size.width), edge(1, grid.size.height)],
+            size_px: view.size_px.map(|s| s as f32),
             vertical_scale: vertical_scale as f32,
             near_m: near_m(grid) as f32,
             reach: ring.reach() as f32,
             transition: ring.transition as f32,
             slot_mask: ring.clip_size as i32 - 1,
             held_mask: ring.held_size() as i32 - 1,
+            padding: [0.0; 2],
         }
     }
 }

@@ -45,6 +45,7 @@ pub struct ClipmapRenderer {
     sampler: wgpu::Sampler,
     whole: wgpu::RenderPipeline,
     ragged: wgpu::RenderPipeline,
+    closer: wgpu::RenderPipeline,
     indices: wgpu::Buffer,
 }
 
@@ -58,7 +59,9 @@ impl ClipmapRenderer {
             bind_group_layouts: &[Some(&layout)],
             immediate_size: 0,
         });
-        let pipeline = |label, ragged| pipeline(device, label, &module, &pipeline_layout, options, ragged);
+        let closer = shader::module(device, "closer.wgsl");
+        let pipeline =
+            |label, module, ragged| pipeline(device, label, module, &pipeline_layout, options, ragged);
         Self {
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("clipscape light sampler"),
@@ -68,8 +71,9 @@ impl ClipmapRenderer {
                 min_filter: wgpu::FilterMode::Linear,
                 ..Default::default()
             }),
-            whole: pipeline("clipscape terrain whole patches", false),
-            ragged: pipeline("clipscape terrain ragged patches", true),
+            whole: pipeline("clipscape terrain whole patches", &module, Some(false)),
+            ragged: pipeline("clipscape terrain ragged patches", &module, Some(true)),
+            closer: pipeline("clipscape terrain closing triangles", &closer, None),
             indices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                 label: Some("clipscape patch indices"),
                 contents: bytemuck::cast_slice(&patch_indices()),
@@ -128,6 +132,7 @@ impl ClipmapRenderer {
         draw(pass, patch.clone(), selection.whole.len());
         pass.set_pipeline(&self.ragged);
         draw(pass, patch.clone(), selection.ragged.len());
+        pass.set_pipeline(&self.closer);
         let mut closers = patch.end;
         for side in &selection.closers {
             let indices = closers..closers + 3 * CLOSER_TRIANGLES as u32;
@@ -187,17 +192,18 @@ fn pipeline(
     module: &wgpu::ShaderModule,
     layout: &wgpu::PipelineLayout,
     options: &RendererOptions,
-    ragged: bool,
+    ragged: Option<bool>,
 ) -> wgpu::RenderPipeline {
     let on = |flag: bool| f64::from(u8::from(flag));
-    let constants = [
-        ("RAGGED", on(ragged)),
+    let mut constants = vec![
         ("VIEW_MODE", f64::from(options.view_mode.index())),
         ("TRACED_LIGHT", on(options.traced_light)),
         ("TINT", on(options.tint)),
         ("HAZE", on(options.haze)),
         ("ENCODE_SRGB", on(!options.colour_format.is_srgb())),
     ];
+    // Only patches are of two kinds; closing triangles may always have to be discarded.
+    constants.extend(ragged.map(|ragged| ("RAGGED", on(ragged))));
     let compilation_options = wgpu::PipelineCompilationOptions {
         constants: &constants,
         ..Default::default()
@@ -240,7 +246,8 @@ fn pipeline(
 }
 
 /// Indices into the 9 x 9 corners of a patch: its quads, split from north-west to south-east, then for each [`Side`]
-/// the triangles of no area (coarse end, middle, coarse end) that close it against a coarser neighbour.
+/// the triangles of no area (middle, coarse end, coarse end) that close it against a coarser neighbour, as indices into
+/// the four sides' nine vertices each: `closer.wgsl` numbers them so.
 fn patch_indices() -> Vec<u16> {
     let corner = |x: i64, z: i64| (z * (PATCH + 1) + x) as u16;
     let mut indices = Vec::new();
@@ -251,14 +258,9 @@ fn patch_indices() -> Vec<u16> {
             indices.extend([nw, sw, se, nw, se, ne]);
         }
     }
-    for side in Side::ALL {
+    for side in 0..Side::ALL.len() as i64 {
         for k in (0..PATCH).step_by(2) {
-            indices.extend([k, k + 1, k + 2].map(|k| match side {
-                Side::West => corner(0, k),
-                Side::East => corner(PATCH, k),
-                Side::North => corner(k, 0),
-                Side::South => corner(k, PATCH),
-            }));
+            indices.extend([k + 1, k, k + 2].map(|k| (side * (PATCH + 1) + k) as u16));
         }
     }
     indices
@@ -285,12 +287,17 @@ mod tests {
                 "{points:?}"
             );
         }
-        for t in indices[3 * PATCH_TRIANGLES as usize..].chunks(3) {
-            let [a, b, c] = [point(t[0]), point(t[1]), point(t[2])];
+        for (n, t) in indices[3 * PATCH_TRIANGLES as usize..].chunks(3).enumerate() {
+            let [middle, start, end] = [i64::from(t[0]), i64::from(t[1]), i64::from(t[2])];
             assert_eq!(
-                (a.0 + c.0, a.1 + c.1),
-                (2 * b.0, 2 * b.1),
-                "the middle lies between the ends"
+                (start + 1, end - 1),
+                (middle, middle),
+                "the middle comes first and lies between the ends"
+            );
+            assert_eq!(
+                middle / (PATCH + 1),
+                n as i64 / CLOSER_TRIANGLES as i64,
+                "sides follow each other"
             );
         }
     }

@@ -3,12 +3,17 @@
 use std::fmt;
 
 /// The shader files, by the names under which they are imported.
-const FILES: [(&str, &str); 4] = [
+const FILES: [(&str, &str); 6] = [
     ("terrain.wgsl", include_str!("../../shaders/terrain.wgsl")),
+    ("closer.wgsl", include_str!("../../shaders/closer.wgsl")),
     ("sky.wgsl", include_str!("../../shaders/sky.wgsl")),
     (
         "shared/surface.wgsl",
         include_str!("../../shaders/shared/surface.wgsl"),
+    ),
+    (
+        "shared/ground.wgsl",
+        include_str!("../../shaders/shared/ground.wgsl"),
     ),
     (
         "shared/shade.wgsl",
