@@ -35,6 +35,13 @@ impl Output {
                 );
             }
             Ok(_) if !force => return Err(exists(target)),
+            // A device or a pipe is nobody's output to replace; a link is replaced, not what it leads to.
+            Ok(found) if !found.is_file() && !found.is_symlink() => {
+                let what = "is no plain file, so it is not replaced";
+                return Err(
+                    Error::new(ErrorKind::Misuse, target.display(), what).advice("choose another name")
+                );
+            }
             Ok(_) => {}
             Err(e) if e.kind() == io::ErrorKind::NotFound => {}
             Err(e) => return Err(Error::io(target.display(), e)),

@@ -197,6 +197,15 @@ impl Flight {
         })
     }
 
+    /// The flight with each key as [`Camera::scaled_down`].
+    ///
+    /// # Errors
+    /// [`ErrorKind::Broken`] where a height leaves the range of keys.
+    pub fn scaled_down(&self, vertical_scale: f64) -> Result<Self> {
+        let scaled = |key: &Key| Key::new(key.t_s, &key.camera().scaled_down(vertical_scale));
+        Self::new(self.fps, self.keys.iter().map(scaled).collect())
+    }
+
     /// Reads a flight from JSON; `name` is what errors call it.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ mod view;
 mod whole;
 
 pub use flight::{Flight, Key};
-pub use view::{MAX_PICTURE_PX, View};
+pub use view::{MAX_PICTURE_PX, View, check_picture};
 pub use whole::overview;
 
 use glam::{DMat3, DVec3};
@@ -76,6 +76,17 @@ impl Camera {
         let right = level_right * cos_r - level_up * sin_r;
         let up = level_up * cos_r + level_right * sin_r;
         DMat3::from_cols(right, up, forward)
+    }
+
+    /// The camera that sees terrain drawn with `vertical_scale` as this one would see it if its heights were scaled:
+    /// a camera's height is in metres before the scale. Unchanged for a scale of 0, which puts every eye into the
+    /// plane that the terrain then is.
+    #[must_use]
+    pub fn scaled_down(mut self, vertical_scale: f64) -> Self {
+        if vertical_scale != 0.0 {
+            self.eye.y /= vertical_scale;
+        }
+        self
     }
 
     /// Heading and pitch in degrees of the direction from `eye` to `target`; north where they coincide.

@@ -8,6 +8,23 @@ use crate::error::{Error, ErrorKind, Result};
 /// The greatest width and height of a picture in pixels: WebGPU's default limit of a texture.
 pub const MAX_PICTURE_PX: u32 = 8192;
 
+/// Refuses a picture of no or too many pixels.
+///
+/// # Errors
+/// [`ErrorKind::Misuse`], naming the size and what is allowed.
+pub fn check_picture(size_px: [u32; 2]) -> Result<()> {
+    if size_px.iter().all(|s| (1..=MAX_PICTURE_PX).contains(s)) {
+        return Ok(());
+    }
+    let [w, h] = size_px;
+    Err(Error::new(
+        ErrorKind::Misuse,
+        "picture",
+        format!("a size of {w}x{h} pixels cannot be drawn"),
+    )
+    .advice(format!("each side may be 1 to {MAX_PICTURE_PX}")))
+}
+
 /// A camera and the size of its picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
@@ -24,13 +41,7 @@ impl View {
     /// [`ErrorKind::Misuse`] for a camera that [`Camera::check`] refuses or a picture of no or too many pixels.
     pub fn new(camera: Camera, size_px: [u32; 2]) -> Result<Self> {
         camera.check()?;
-        if size_px.iter().any(|s| !(1..=MAX_PICTURE_PX).contains(s)) {
-            let [w, h] = size_px;
-            return Err(
-                Error::new(ErrorKind::Misuse, "picture", format!("a size of {w}x{h} pixels"))
-                    .advice(format!("each side may be 1 to {MAX_PICTURE_PX}")),
-            );
-        }
+        check_picture(size_px)?;
         Ok(Self { camera, size_px })
     }
 

@@ -9,7 +9,7 @@ use super::args::{RenderArgs, ViewArgs};
 use super::input::beside;
 use super::progress::Terminal;
 use crate::build::{Output, refuse_existing};
-use crate::camera::{Camera, Flight, overview};
+use crate::camera::{Camera, Flight, check_picture, overview};
 use crate::clipmap::ClipmapOptions;
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu;
@@ -32,6 +32,8 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     let out = args.output.clone().unwrap_or_else(|| default_output(args));
     let flight_file = args.flight.as_deref().filter(|f| *f != Path::new("orbit"));
     let flight_json = flight_file.map(read_flight).transpose()?;
+    refuse_same_files(args, &out)?;
+    check_picture(args.view.size)?;
     let flight = flight_json
         .as_ref()
         .map(|(name, json)| Flight::parse(name, json))
@@ -71,25 +73,39 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     let terrain = Terrain::open(&args.input, terminal)?;
     warn_of_sun(args, &terrain, terminal);
     let mut headless = Headless::new(gpu, &terrain, &headless_options(&args.view, &terrain, &ring))?;
-    let [low, high] = headless
+    let scale = args.view.vertical_scale;
+    let heights = headless
         .clipmap()
         .height_range_m()
-        .map(|h| f64::from(h) + terrain.grid().base_m);
+        .map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
+    let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
     let aspect = f64::from(args.view.size[0]) / f64::from(args.view.size[1]);
     let frames = match (flight, args.flight.is_some(), args.eye) {
         (Some(flight), ..) => recording.record(&mut headless, &terrain, &flight, terminal)?,
         (None, true, _) => {
-            let orbit = Flight::orbit(terrain.grid(), low, high);
+            let orbit = Flight::orbit(terrain.grid(), low, high).scaled_down(scale)?;
             recording.record(&mut headless, &terrain, &orbit, terminal)?
         }
         (None, false, eye) => {
             let camera = match eye {
                 Some(eye) => camera(args, eye),
-                None => overview(terrain.grid(), low, high, aspect),
+                None => overview(terrain.grid(), low, high, aspect).scaled_down(scale),
             };
-            vec![picture(&out, args.force, &mut headless, &terrain, &camera)?]
+            vec![picture(
+                &out,
+                args.force,
+                &mut headless,
+                &terrain,
+                &camera,
+                terminal,
+            )?]
         }
     };
+    if frames.iter().all(|f| f.patches == 0) {
+        terminal.warn(&format!("{}: no terrain is seen", terrain.name()));
+    } else if frames.iter().any(|f| f.cut) {
+        terminal.warn("coarser levels are left out, so the terrain ends at a border; see --levels");
+    }
     let faults = terrain.faults();
     if let (Some((output, file)), Some(path)) = (stats, &args.view.stats) {
         let run = Run {
@@ -121,6 +137,31 @@ fn command_line() -> String {
         .map(|a| a.to_string_lossy().into_owned())
         .collect();
     arguments.join(" ")
+}
+
+/// Refuses outputs that are one another or an input: `--force` replaces earlier results, never what they are made of.
+fn refuse_same_files(args: &RenderArgs, out: &Path) -> Result<()> {
+    let same = |a: &Path, b: &Path| {
+        // What exists is told by where it leads, what does not by its name.
+        a == b || fs::canonicalize(a).is_ok_and(|a| fs::canonicalize(b).is_ok_and(|b| a == b))
+    };
+    let outputs: Vec<&Path> = [Some(out), args.view.stats.as_deref()]
+        .into_iter()
+        .chain([args.animation.as_deref(), args.contact_sheet.as_deref()])
+        .flatten()
+        .collect();
+    let inputs = [Some(args.input.as_path()), args.flight.as_deref()];
+    for (k, output) in outputs.iter().enumerate() {
+        let misuse =
+            |what| Err(Error::new(ErrorKind::Misuse, output.display(), what).advice("choose another name"));
+        if inputs.iter().flatten().any(|input| same(input, output)) {
+            return misuse("is an input, so it is not replaced");
+        }
+        if outputs[..k].iter().any(|other| same(other, output)) {
+            return misuse("is asked for twice");
+        }
+    }
+    Ok(())
 }
 
 fn default_output(args: &RenderArgs) -> PathBuf {

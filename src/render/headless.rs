@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::camera::View;
+use crate::camera::{View, check_picture};
 use crate::clipmap::{Clipmap, ClipmapOptions, UpdateReport};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu::{
@@ -96,6 +96,7 @@ impl Headless {
     /// # Errors
     /// [`ErrorKind::Misuse`] for options out of range; those of `levels`.
     pub fn new(gpu: Gpu, levels: &dyn Levels, options: &HeadlessOptions) -> Result<Self> {
+        check_picture(options.size_px)?;
         if ![1, 4].contains(&options.sample_count) {
             let what = format!("{} samples a pixel", options.sample_count);
             return Err(Error::new(ErrorKind::Misuse, "multisampling", what).advice("use 1 or 4"));

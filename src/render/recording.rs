@@ -134,18 +134,23 @@ impl Recording {
 /// Draws one picture of `levels` into `path`, and reports it as frame 0.
 ///
 /// # Errors
-/// [`ErrorKind::Misuse`] where `path` exists and may not be replaced; those of drawing and writing.
+/// [`ErrorKind::Misuse`] where `path` exists and may not be replaced; those of drawing and writing;
+/// [`ErrorKind::Cancelled`] once the frame is drawn.
 pub fn picture(
     path: &Path,
     force: bool,
     headless: &mut Headless,
     levels: &dyn Levels,
     camera: &Camera,
+    progress: &dyn Progress,
 ) -> Result<FrameStats> {
     if !force {
         refuse_existing(path)?;
     }
     let frame = headless.frame(levels, camera)?;
+    if progress.cancelled() {
+        return Err(Error::cancelled(path.display()));
+    }
     let [width, height] = headless.size_px();
     write_png(path, width, height, &frame.rgba8)?;
     Ok(frame_stats(&frame, 0, 0.0, camera))

@@ -40,7 +40,7 @@ pub(in crate::cli) struct RenderArgs {
     pub(in crate::cli) roll: Option<f64>,
 
     /// Vertical field of view in degrees [default: 60]
-    #[arg(long, value_name = "DEGREES", value_parser = view_values::fov, requires = "eye")]
+    #[arg(long, value_name = "DEGREES", value_parser = view_values::fov, requires = "eye", allow_negative_numbers = true)]
     pub(in crate::cli) fov: Option<f64>,
 
     /// Draw the frames of a flight: a JSON file, or orbit to circle the DEM once
@@ -75,12 +75,12 @@ pub(in crate::cli) struct RenderArgs {
 #[derive(Debug, Args)]
 pub(in crate::cli) struct ViewArgs {
     /// Pixels of a frame
-    #[arg(long, value_name = "WxH", value_parser = view_values::size, default_value = "1280x720")]
+    #[arg(long, value_name = "WxH", value_parser = view_values::size, default_value = "1280x720", allow_hyphen_values = true)]
     pub(in crate::cli) size: [u32; 2],
 
     /// Samples along the side of a level's window, a power of two from 64 to 2048 [default: 256; what
     /// suits the picture's height where the whole DEM is shown]
-    #[arg(long, value_name = "N", value_parser = view_values::clip_size)]
+    #[arg(long, value_name = "N", value_parser = view_values::clip_size, allow_negative_numbers = true)]
     pub(in crate::cli) clip_size: Option<i64>,
 
     /// Keep only the finest levels, this many
