@@ -82,6 +82,11 @@ impl Error {
             std::io::ErrorKind::NotFound => ("no such file or folder".into(), "check the path"),
             std::io::ErrorKind::PermissionDenied => ("permission denied".into(), "choose another place"),
             std::io::ErrorKind::StorageFull => ("the disk is full".into(), "free some space"),
+            std::io::ErrorKind::NotADirectory => (
+                "a part of its path is a file, not a folder".into(),
+                "choose another place",
+            ),
+            std::io::ErrorKind::IsADirectory => ("is a folder".into(), "name a file"),
             std::io::ErrorKind::UnexpectedEof => ("ends too early".into(), "fetch the file again"),
             _ => (error.to_string(), ""),
         };

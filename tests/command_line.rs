@@ -385,8 +385,8 @@ fn an_interrupt_is_status_130_and_leaves_nothing() {
     }
     let id = child.id().to_string();
     assert!(
-        Command::new("kill")
-            .args(["-INT", &id])
+        Command::new("sh")
+            .args(["-c", "kill -INT \"$1\"", "sh", &id])
             .status()
             .unwrap()
             .success()

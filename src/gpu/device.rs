@@ -33,13 +33,14 @@ impl Gpu {
 /// # Errors
 /// [`ErrorKind::Device`] where there is no adapter or it gives no device.
 pub fn open() -> Result<Gpu> {
-    let none = |error: &dyn std::fmt::Display| {
-        Error::new(
-            ErrorKind::Device,
-            "graphics",
-            format!("no usable adapter ({})", first_line(error)),
+    let none = |cause: &dyn std::error::Error| {
+        let what = format!(
+            "no usable Vulkan, Metal or Direct3D 12 adapter ({})",
+            short(cause)
+        );
+        Error::new(ErrorKind::Device, "graphics", what).advice(
+            "install a Vulkan driver; mesa-vulkan-drivers on Debian has one that needs no graphics card",
         )
-        .advice("install a Vulkan driver; mesa-vulkan-drivers on Debian has one that needs no graphics card")
     };
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let options = wgpu::RequestAdapterOptions {
@@ -62,12 +63,16 @@ pub fn open() -> Result<Gpu> {
     })
 }
 
-fn first_line(error: &dyn std::fmt::Display) -> String {
-    error
-        .to_string()
-        .lines()
+/// The beginning of a library's message, without the list of all that it tried.
+fn short(cause: &dyn std::error::Error) -> String {
+    let text = cause.to_string();
+    let line = text.lines().next().unwrap_or_default();
+    line.split(" (")
         .next()
-        .unwrap_or_default()
+        .unwrap_or(line)
+        .split(';')
+        .next()
+        .unwrap_or(line)
         .trim_end_matches([':', '.'])
         .to_string()
 }

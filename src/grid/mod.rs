@@ -160,6 +160,16 @@ mod tests {
     }
 
     #[test]
+    fn control_levels_rounded_down_would_miss_the_edge() {
+        let last = |n: i64, l: u32| ((n - 1) >> l) << l;
+        assert!(
+            [1000, 1013, 13201]
+                .iter()
+                .any(|&n| (0..8).any(|l| last(n, l) < n - 1))
+        );
+    }
+
+    #[test]
     fn sizes_compose_from_level_to_level() {
         for n in 1..2000 {
             let size = Size { width: n, height: 3 };

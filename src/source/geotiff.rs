@@ -397,7 +397,8 @@ fn refused(name: &str, error: TiffError) -> Error {
             ErrorKind::Limit,
             name,
             "claims more memory than a file of its length can need",
-        ),
+        )
+        .advice("check that the file is whole"),
         TiffError::UsageError(e) => broken(format!("cannot be decoded: {e}")),
     };
     refusal.because(error)
