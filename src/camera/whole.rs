@@ -71,23 +71,47 @@ impl Flight {
 fn closest(cameras: impl IntoIterator<Item = Camera>, low: DVec3, high: DVec3, aspect: f64) -> DVec3 {
     let along = (FOV_DEG / 2.0).to_radians().tan() * FILL;
     let across = along * aspect;
+    let relative = |camera: Camera| corners(low, high).map(move |c| seen(camera.axes(), c - camera.eye));
+    let points: Vec<[f64; 3]> = cameras.into_iter().flat_map(relative).collect();
     // Least values of b in `e.r - across e.f >= b` and of its three siblings, relative to the middle.
     let mut bounds = [f64::NEG_INFINITY; 4];
-    for camera in cameras {
-        for corner in corners(low, high) {
-            let [right, up, forward] = seen(camera.axes(), corner - camera.eye);
-            let here = [
-                right - across * forward,
-                -right - across * forward,
-                up - along * forward,
-                -up - along * forward,
-            ];
-            bounds = std::array::from_fn(|k| bounds[k].max(here[k]));
-        }
+    for &[right, up, forward] in &points {
+        let here = [
+            right - across * forward,
+            -right - across * forward,
+            up - along * forward,
+            -up - along * forward,
+        ];
+        bounds = std::array::from_fn(|k| bounds[k].max(here[k]));
     }
     let [east, west, above, below] = bounds;
     let back = ((east + west) / (2.0 * across)).max((above + below) / (2.0 * along));
-    DVec3::new((east - west) / 2.0, (above - below) / 2.0, -back)
+    let up = centred(&points, back, [above - along * back, along * back - below]);
+    DVec3::new((east - west) / 2.0, up, -back)
+}
+
+/// How far up, within `range`, an eye that stands `back` behind must be for as much room above as below in its frame.
+fn centred(points: &[[f64; 3]], back: f64, range: [f64; 2]) -> f64 {
+    // Raising the eye lowers what it sees, so the difference falls and is halved down to where it changes sign.
+    let excess_above = |eye_up: f64| {
+        let slopes = points
+            .iter()
+            .map(|[_, up, forward]| (up - eye_up) / (forward + back));
+        let (least, most) = slopes.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), s| {
+            (a.min(s), b.max(s))
+        });
+        least + most
+    };
+    let [mut low, mut high] = range;
+    for _ in 0..60 {
+        let middle = low + (high - low) / 2.0;
+        *(if excess_above(middle) > 0.0 {
+            &mut low
+        } else {
+            &mut high
+        }) = middle;
+    }
+    low + (high - low) / 2.0
 }
 
 fn looking(eye: DVec3, heading_deg: f64, pitch_deg: f64) -> Camera {
@@ -164,6 +188,22 @@ mod tests {
                 .max((up / (along * forward)).abs())
         });
         reach.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn an_overview_leaves_as_much_room_above_as_below() {
+        let (width, height, spacing, min_m, max_m) = DEMS[0];
+        let grid = Grid::new(width, height, spacing);
+        let (low, high) = ground_box(&grid, min_m, max_m);
+        let camera = overview(&grid, min_m, max_m, 16.0 / 9.0);
+        let slopes = corners(low, high).map(|corner| {
+            let [_, up, forward] = seen(camera.axes(), corner - camera.eye);
+            up / forward
+        });
+        let (least, most) = slopes.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), s| {
+            (a.min(s), b.max(s))
+        });
+        assert!((least + most).abs() < 1e-9 && most > 0.1, "{least} {most}");
     }
 
     #[test]
