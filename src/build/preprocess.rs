@@ -8,15 +8,13 @@ use super::memory::{self, DEFAULT_MEMORY_BYTES, peak_rss_bytes};
 use super::output::Output;
 use super::threads::Threads;
 use crate::error::{Error, ErrorKind, Result};
-use crate::grid::{Grid, Rect, Size};
-use crate::levels::LightSample;
+use crate::grid::{Rect, Size};
 use crate::light::{LightOptions, light_levels, sky_share, sun_share};
 use crate::progress::Progress;
 use crate::pyramid::{DEFAULT_LOBES, Filter, MAX_LOBES, Pyramid};
 use crate::source::{Description, HeightSource};
 use crate::terrain::layout::Layout;
 use crate::terrain::{self, LightMeta, Meta, SourceStamp};
-use crate::work::Work;
 
 /// Rows that are read at once.
 const BAND_ROWS: i64 = 256;
@@ -142,19 +140,13 @@ pub fn preprocess(
         pyramid.bound(&threads, progress)?;
         report.bounds_s = clock.lap();
         if let Some(light) = &options.light {
-            let levels = trace(
-                &pyramid,
-                &description.grid,
-                light,
-                &filter,
-                &threads,
-                progress,
-                |sun_s| {
-                    report.sun_s = sun_s;
-                },
-            )?;
+            let (grid, heights) = (&description.grid, pyramid.level(0));
+            let sun = sun_share(heights, grid, light.sun, &threads, progress)?;
+            report.sun_s = clock.lap();
+            let sky = sky_share(heights, grid, light.sky_directions, &threads, progress)?;
+            let levels = light_levels(grid, heights, sun, sky, &filter, &threads, progress)?;
             pyramid.set_light(levels)?;
-            report.sky_s = (clock.lap() - report.sun_s).max(0.0);
+            report.sky_s = clock.lap();
         }
         let meta = describe(description, &pyramid, &filter, options, stamp);
         let buffered = BufWriter::with_capacity(1 << 20, &file);
@@ -276,24 +268,6 @@ fn read(source: &dyn HeightSource, progress: &dyn Progress) -> Result<Vec<f32>> 
     Ok(heights)
 }
 
-/// Traces the light of all levels; `sun_done` hears the seconds that the sun took.
-fn trace(
-    pyramid: &Pyramid,
-    grid: &Grid,
-    options: &LightOptions,
-    filter: &Filter,
-    work: &dyn Work,
-    progress: &dyn Progress,
-    sun_done: impl FnOnce(f64),
-) -> Result<Vec<Vec<LightSample>>> {
-    let heights = pyramid.level(0);
-    let start = Instant::now();
-    let sun = sun_share(heights, grid, options.sun, work, progress)?;
-    sun_done(start.elapsed().as_secs_f64());
-    let sky = sky_share(heights, grid, options.sky_directions, work, progress)?;
-    light_levels(grid, heights, sun, sky, filter, work, progress)
-}
-
 /// Upper bound of what rounding heights to f32 cost, in metres: 0 where the source's own type and step show
 /// that f32 holds each of them, else half the spacing of f32 at the greatest.
 fn rounding_m(description: &Description, heights: &[f32]) -> f64 {
@@ -344,6 +318,7 @@ fn describe(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::Grid;
 
     fn described(sample_type: &str, step_m: Option<f64>, unit: &str) -> Description {
         Description {

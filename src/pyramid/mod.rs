@@ -166,11 +166,6 @@ impl Pyramid {
         self.bounds.get(l as usize).map_or(&[], Vec::as_slice)
     }
 
-    /// The light of level `l`, row by row; empty where there is no such level or no light.
-    pub fn level_light(&self, l: u32) -> &[LightSample] {
-        self.light.get(l as usize).map_or(&[], Vec::as_slice)
-    }
-
     /// The most, in metres, by which any sample of a level above 0 leaves the range of level 0.
     pub fn overshoot_m(&self) -> f32 {
         self.overshoot_m
