@@ -84,15 +84,15 @@ struct Setting<'a> {
 impl Setting<'_> {
     /// Draws twice and takes the time of the second frame: the first pays for what the setting before left in caches.
     fn time(&mut self) -> Result<()> {
-        self.headless.frame(self.terrain, &self.camera)?;
-        let frame = self.headless.frame(self.terrain, &self.camera)?;
+        self.headless.frame(self.terrain, &self.camera, 0.0)?;
+        let frame = self.headless.frame(self.terrain, &self.camera, 0.0)?;
         self.draw_ms.push(frame.plan_ms + frame.upload_ms + frame.draw_ms);
         Ok(())
     }
 
     /// What was drawn, as depth: colours depend on a terrain's range of heights, which the two do not share.
     fn first_draw(&mut self) -> Result<Vec<f32>> {
-        self.headless.frame(self.terrain, &self.camera)?;
+        self.headless.frame(self.terrain, &self.camera, 0.0)?;
         self.headless.read_depth()
     }
 

@@ -42,10 +42,14 @@ pub struct FrameStats {
     pub upload_bytes: u64,
     /// Bytes newly exposed, computed from the windows before and after and not from the plan.
     pub upload_bytes_exposed: u64,
-    /// Whether nothing that the frame should have shown was missing.
+    /// Whether all data that the frame should show were there, and had faded in.
     pub complete: bool,
     /// Whether the coarsest level's window ended before the DEM did.
     pub cut: bool,
+    /// Levels of which something was drawn coarser than it would have been with its data there in time.
+    pub stale_levels: u32,
+    /// Patches whose detail vanished at once, because their data came too late to be taken back gently.
+    pub pops: u64,
 }
 
 /// Median and 99th percentile of one quantity over a run, by [`percentile`].
@@ -192,6 +196,8 @@ mod tests {
             upload_bytes_exposed: 800,
             complete: true,
             cut: false,
+            stale_levels: 0,
+            pops: 0,
         }
     }
 
@@ -224,7 +230,7 @@ mod tests {
         let json = serde_json::to_string(&frame(3)).unwrap();
         let names: Vec<&str> = json.split('"').skip(1).step_by(2).collect();
         let documented = "frame t_s eye plan_ms upload_ms draw_ms gpu_ms frame_ms triangles draw_calls patches \
-            patches_culled levels_drawn uploads upload_bytes upload_bytes_exposed complete cut";
+            patches_culled levels_drawn uploads upload_bytes upload_bytes_exposed complete cut stale_levels pops";
         assert_eq!(names, documented.split_whitespace().collect::<Vec<_>>());
         assert!(json.contains("\"gpu_ms\":null"), "{json}");
         assert_eq!(serde_json::from_str::<FrameStats>(&json).unwrap(), frame(3));

@@ -90,7 +90,7 @@ fn near() -> Camera {
 
 fn draw(options: &HeadlessOptions, camera: &Camera) -> Option<Vec<u8>> {
     let mut headless = Headless::new(gpu()?, pyrenees(), options).unwrap();
-    Some(headless.frame(pyrenees(), camera).unwrap().rgba8)
+    Some(headless.frame(pyrenees(), camera, 0.0).unwrap().rgba8)
 }
 
 /// Mean difference of the channels, and the share of pixels of which one differs by more than [`FAR`].
@@ -240,7 +240,9 @@ fn what_closing_triangles_cover_is_coloured_like_the_ground_beside_it() {
         };
         options.clipmap.clip_size = clip_size;
         let mut headless = Headless::new(gpu.clone(), pyrenees(), &options).unwrap();
-        let frame = headless.frame(pyrenees(), &flight.camera_at_frame(k)).unwrap();
+        let frame = headless
+            .frame(pyrenees(), &flight.camera_at_frame(k), 0.0)
+            .unwrap();
         // Neither sky nor ground is ever black.
         let black = frame.rgba8.chunks(4).filter(|p| p[..3] == [0, 0, 0]).count();
         assert_eq!(black, 0, "frame {k}, clip size {clip_size}");

@@ -88,7 +88,7 @@ fn read_back_textures_equal_the_mirror_after_a_walk() {
             roll_deg: 0.0,
             fov_deg: 60.0,
         };
-        let frame = headless.frame(&levels, &camera).unwrap();
+        let frame = headless.frame(&levels, &camera, 0.0).unwrap();
         assert_eq!(
             frame.upload.bytes, frame.update.upload_bytes_exposed,
             "seed {seed}, step {step}"
@@ -295,7 +295,7 @@ fn displaced_vertices_equal_the_twin_s() {
         let mut headless = Headless::new(gpu.clone(), &levels, &options(clip_size, [64, 64])).unwrap();
         for k in 0..20 {
             let camera = camera(&mut random, &levels.grid);
-            headless.frame(&levels, &camera).unwrap();
+            headless.frame(&levels, &camera, 0.0).unwrap();
             let twin = displace_on_cpu(headless.clipmap());
             let device = displace_on_device(&headless);
             let (worst, differing) = compare(&device, &twin, headless.clipmap());
@@ -315,7 +315,7 @@ fn displaced_vertices_equal_the_twin_s() {
                 raised.height = |l, i, j| ground(l, i, j) + if (7 * i + j) % 13 == 0 { 0.01 } else { 0.0 };
                 let mut other = Clipmap::new(&raised, &options(clip_size, [64, 64]).clipmap).unwrap();
                 other
-                    .update(&raised, &View::new(camera, [64, 64]).unwrap())
+                    .update(&raised, &View::new(camera, [64, 64]).unwrap(), 0.0)
                     .unwrap();
                 // `fill` follows the bounds, which may differ.
                 let patches = |c: &Clipmap| -> Vec<_> {
@@ -434,7 +434,7 @@ fn drawn_depths_equal_those_of_the_twin_s_triangles() {
             roll_deg: 0.0,
             fov_deg: 50.0,
         };
-        headless.frame(&flat, &camera).unwrap();
+        headless.frame(&flat, &camera, 0.0).unwrap();
         let drawn = headless.read_depth().unwrap();
         let grid = &flat.grid;
         let twin = TwinDepth::new(headless.clipmap(), size_px);

@@ -194,7 +194,7 @@ fn control_a_side_that_is_not_closed_is_caught() {
     for _ in 0..40 {
         let scene = scene(&mut random);
         let mut clipmap = Clipmap::new(&scene.levels, &scene.options).unwrap();
-        clipmap.update(&scene.levels, &scene.view).unwrap();
+        clipmap.update(&scene.levels, &scene.view, 0.0).unwrap();
         let mut selection = clipmap.selection().clone();
         selection.closers.swap(0, 1);
         let sides = selection.closers[0].len() + selection.closers[1].len();
@@ -212,7 +212,7 @@ fn alpha_s_facts_hold_over_random_scenes() {
     for k in 0..150 {
         let scene = scene(&mut random);
         let mut clipmap = Clipmap::new(&scene.levels, &scene.options).unwrap();
-        clipmap.update(&scene.levels, &scene.view).unwrap();
+        clipmap.update(&scene.levels, &scene.view, 0.0).unwrap();
         let faults = faults(&clipmap, &clipmap);
         let place = || {
             format!(
@@ -253,11 +253,11 @@ fn control_a_selection_that_lags_behind_the_shader_is_caught() {
     for _ in 0..40 {
         let mut scene = scene(&mut random);
         let mut clipmap = Clipmap::new(&scene.levels, &scene.options).unwrap();
-        clipmap.update(&scene.levels, &scene.view).unwrap();
+        clipmap.update(&scene.levels, &scene.view, 0.0).unwrap();
         let mut moved = clipmap.clone();
         let spacing_m = scene.levels.grid.spacing_m;
         scene.view.camera.eye += DVec3::new(20.0 * spacing_m[0], 0.0, 20.0 * spacing_m[1]);
-        moved.update(&scene.levels, &scene.view).unwrap();
+        moved.update(&scene.levels, &scene.view, 0.0).unwrap();
         caught += u32::from(!faults(&clipmap, &moved).is_empty());
     }
     // Where all that is drawn is one level, there is nothing to contradict.
@@ -317,7 +317,7 @@ fn culling_leaves_out_only_what_is_not_seen() {
                 ..scene.options
             };
             let mut clipmap = Clipmap::new(levels, &options).unwrap();
-            clipmap.update(levels, &view).unwrap();
+            clipmap.update(levels, &view, 0.0).unwrap();
             clipmap
         };
         let (all, culled) = (draw(false), draw(true));

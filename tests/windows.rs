@@ -99,7 +99,7 @@ fn walk(moves: usize, seed: u64, spoil: impl Fn(&mut LevelPlan)) -> Result<(), S
                 x += random.uniform(-stride, stride);
                 z += random.uniform(-stride, stride);
             }
-            let report = *clipmap.update(&levels, &view(x, z)).unwrap();
+            let report = *clipmap.update(&levels, &view(x, z), 0.0).unwrap();
             assert_eq!(report.upload_bytes, report.upload_bytes_exposed, "{place}");
             for plan in clipmap.plan().levels() {
                 let (l, window) = (plan.level, &clipmap.windows()[plan.level as usize]);
@@ -239,11 +239,11 @@ fn a_source_that_fails_leaves_a_window_that_heals() {
         },
     )
     .unwrap();
-    clipmap.update(&levels, &view(300.0, 300.0)).unwrap();
+    clipmap.update(&levels, &view(300.0, 300.0), 0.0).unwrap();
     levels.1.store(true, Ordering::Relaxed);
-    assert!(clipmap.update(&levels, &view(310.0, 303.0)).is_err());
+    assert!(clipmap.update(&levels, &view(310.0, 303.0), 0.0).is_err());
     levels.1.store(false, Ordering::Relaxed);
-    clipmap.update(&levels, &view(311.0, 303.0)).unwrap();
+    clipmap.update(&levels, &view(311.0, 303.0), 0.0).unwrap();
     for window in clipmap.windows() {
         for (i, j) in window.resident().cells() {
             assert_eq!(window.height(i, j), Some(value(window.level(), i, j)));
@@ -265,7 +265,7 @@ fn slopes_have_the_ramp_s_direction_and_size_on_every_level() {
         },
     )
     .unwrap();
-    clipmap.update(&levels, &view(900.0, 1700.0)).unwrap();
+    clipmap.update(&levels, &view(900.0, 1700.0), 0.0).unwrap();
     assert!(clipmap.windows().len() >= 4);
     for window in clipmap.windows() {
         assert!(!window.light_resident().is_empty());

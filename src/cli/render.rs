@@ -59,9 +59,11 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     let ring = ClipmapOptions {
         clip_size: clip_size(args),
         transition: args.view.transition,
+        wait: args.view.wait,
+        upload_budget_bytes: args.view.upload_budget,
         ..Default::default()
     };
-    ring.ring()?;
+    ring.check()?;
     let stats = args
         .view
         .stats
@@ -106,7 +108,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     } else if frames.iter().any(|f| f.cut) {
         terminal.warn("coarser levels are left out, so the terrain ends at a border; see --levels");
     }
-    let faults = terrain.faults();
+    let faults = distinct(headless.take_faults().into_iter().chain(terrain.faults()));
     if let (Some((output, file)), Some(path)) = (stats, &args.view.stats) {
         let run = Run {
             device: headless.gpu().info.name.clone(),
@@ -119,8 +121,11 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         write_stats(&file, path, &frames, run)?;
         output.publish(&file)?;
     }
-    for fault in faults {
-        terminal.warn(&fault.to_string());
+    for fault in &faults {
+        terminal.warn(fault);
+    }
+    if frames.iter().any(|f| !f.complete) {
+        terminal.warn("some frames were drawn before all of their data were there; see --wait");
     }
     let what = if frames.len() == 1 {
         "1 frame".to_string()
@@ -129,6 +134,17 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     };
     terminal.note(&format!("{} holds {what}", out.display()));
     Ok(())
+}
+
+/// What faults say, each once: ground that is met again is damaged still.
+fn distinct(faults: impl Iterator<Item = Error>) -> Vec<String> {
+    let mut texts = Vec::new();
+    for text in faults.map(|f| f.to_string()) {
+        if !texts.contains(&text) {
+            texts.push(text);
+        }
+    }
+    texts
 }
 
 /// The command line as one line, whatever its arguments are made of.

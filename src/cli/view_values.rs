@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::values::{number, numbers};
+use crate::clipmap::Wait;
 use crate::shade::ViewMode;
 
 /// A place `X,Y,Z` in world metres.
@@ -72,6 +73,15 @@ pub(super) fn view(text: &str) -> Result<ViewMode, String> {
         let names: Vec<&str> = ViewMode::NAMED.iter().map(|(name, _)| *name).collect();
         format!("not one of {}", names.join(", "))
     })
+}
+
+/// Whether frames wait for their data.
+pub(super) fn wait(text: &str) -> Result<Wait, String> {
+    match text {
+        "all" => Ok(Wait::All),
+        "none" => Ok(Wait::None),
+        _ => Err("neither all nor none".into()),
+    }
 }
 
 #[cfg(test)]

@@ -26,11 +26,11 @@
 //! of its points has `d_{l+1} < (R + MARGIN) / 2 + 8` (the climb at least halves from level to level, because the
 //! ground it is measured from never falls, see [`super::Clipmap`]). From `T <= N/4 - 10` and `R = N/2 - 2`:
 //! `R - T >= N/4 + 8`, and `R/2 + 8 = N/4 + 7`: a whole step to spare, so the ring of level `l + 1` is selected 0.
-//! For the held field, (c) rests on saturation and on the order of arrival, where those are computed.
+//! For the held field, (c) rests on the order in which patches fade in, see [`super::HeldField`].
 //!
 //! From (b) and (c): neighbours differ by one level at most, and what the finer morphs towards is what is drawn.
 
-use super::constants::{LevelConstants, ViewConstants};
+use super::constants::ViewConstants;
 use super::held::HeldField;
 
 /// Steps by which the selection refines beyond the reach, so that rounding in the shader cannot contradict (b).
@@ -57,11 +57,11 @@ pub fn lerp(s: f32, t: f32, k: f32) -> f32 {
     if k == 1.0 { t } else { s + (t - s) * k }
 }
 
-/// The held field of `level` at its vertex (i, j).
-pub fn held(field: &HeldField, level_constants: &LevelConstants, level: u32, i: i32, j: i32) -> f32 {
+/// The held field of `level` at its vertex (i, j); `parent_last` is the last patch of the next coarser level.
+pub fn held(field: &HeldField, parent_last: [i32; 2], level: u32, i: i32, j: i32) -> f32 {
     // A parent patch is 16 vertices wide; the last one also owns its far side.
-    let x = (i >> 4).min(level_constants.parent_last[0]);
-    let z = (j >> 4).min(level_constants.parent_last[1]);
+    let x = (i >> 4).min(parent_last[0]);
+    let z = (j >> 4).min(parent_last[1]);
     let u = (i - (x << 4)) as f32 * 0.0625;
     let v = (j - (z << 4)) as f32 * 0.0625;
     let corner = |dx: i32, dz: i32| field.corner(level, i64::from(x + dx), i64::from(z + dz));
@@ -109,16 +109,10 @@ mod tests {
                 field.set_corner(0, x, z, value);
             }
         }
-        let constants = |last| LevelConstants {
-            parent_last: [last, last],
-            ..LevelConstants::zeroed()
-        };
         // Vertex 32 belongs to parent 2; made the far side of parent 1 it must come out the same.
         for j in 0..32 {
-            let own = held(&field, &constants(4), 0, 32, j);
-            let mut far = constants(4);
-            far.parent_last[0] = 1;
-            assert_eq!(own.to_bits(), held(&field, &far, 0, 32, j).to_bits(), "row {j}");
+            let own = held(&field, [4, 4], 0, 32, j);
+            assert_eq!(own.to_bits(), held(&field, [1, 4], 0, 32, j).to_bits(), "row {j}");
         }
     }
 

@@ -5,21 +5,24 @@
 //! [`Selection`]; it knows nothing more.
 
 pub mod alpha;
+mod arrivals;
 mod constants;
 mod eye;
 mod frustum;
 mod ground;
 mod held;
+mod missing;
 mod plan;
 mod relief;
 mod selection;
 mod vertex;
 mod window;
 
+pub use arrivals::Wait;
 pub use constants::{LEVEL_SLOTS, LevelConstants, Ring, VOID_HEIGHT, ViewConstants, light_level, near_m};
 pub use eye::Eye;
 pub use frustum::Frustum;
-pub use held::HeldField;
+pub use held::{FADE_S, HeldField};
 pub use plan::{HEIGHT_BYTES, LIGHT_BYTES, LevelPlan, UpdatePlan, exposed_bytes};
 pub use selection::{CLOSER_TRIANGLES, Instance, PATCH_TRIANGLES, Scene, Selection, Side};
 pub use vertex::{Vertex, displace};
@@ -28,8 +31,11 @@ pub use window::{LightTexel, PatchInfo, Window};
 use crate::camera::View;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Grid;
-use crate::levels::{Bounds, Levels};
-use window::{Scratch, arrived};
+use crate::levels::{Arrival, Bounds, Levels};
+use arrivals::Arrivals;
+use ground::Ground;
+use held::{FadeReport, Moment};
+use window::Scratch;
 
 /// How a clipmap is laid out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +50,11 @@ pub struct ClipmapOptions {
     pub vertical_scale: f64,
     /// Whether patches that are not seen are left out.
     pub cull: bool,
+    /// Whether frames wait for their data.
+    pub wait: Wait,
+    /// The most bytes of samples that an update writes, beside the coarsest level; no limit where none. Only without
+    /// waiting.
+    pub upload_budget_bytes: Option<u64>,
 }
 
 impl Default for ClipmapOptions {
@@ -54,6 +65,8 @@ impl Default for ClipmapOptions {
             transition: None,
             vertical_scale: 1.0,
             cull: true,
+            wait: Wait::All,
+            upload_budget_bytes: None,
         }
     }
 }
@@ -74,6 +87,29 @@ impl ClipmapOptions {
         ring.check()?;
         Ok(ring)
     }
+
+    /// Refuses options that are out of range or contradict each other.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`], naming the option.
+    pub fn check(&self) -> Result<()> {
+        self.ring()?;
+        let misuse = |subject: &str, what: String| Error::new(ErrorKind::Misuse, subject, what);
+        if !self.vertical_scale.is_finite() {
+            return Err(misuse(
+                "vertical scale",
+                format!("{} is not finite", self.vertical_scale),
+            ));
+        }
+        if self.levels == Some(0) {
+            return Err(misuse("levels", "0 levels draw nothing".into()).advice("ask for at least 1"));
+        }
+        if self.upload_budget_bytes.is_some() && self.wait == Wait::All {
+            let what = "a frame that waits for all of its data can keep no budget";
+            return Err(misuse("upload budget", what.into()).advice("draw without waiting"));
+        }
+        Ok(())
+    }
 }
 
 /// What an update did.
@@ -93,8 +129,12 @@ pub struct UpdateReport {
     pub triangles: u64,
     /// Levels of which something is drawn.
     pub levels_drawn: u32,
-    /// Whether all data that the frame draws are there.
+    /// Whether all data that the frame should show are there, and have faded in.
     pub complete: bool,
+    /// Levels of which something is drawn coarser than it would be if its data had been there in time.
+    pub stale_levels: u32,
+    /// Patches whose detail vanished at once, because their data came too late to be taken back gently.
+    pub pops: u64,
     /// Whether coarser levels were left out by [`ClipmapOptions::levels`], so that the picture ends at a border.
     pub cut: bool,
 }
@@ -111,6 +151,10 @@ pub struct Clipmap {
     range_m: [f32; 2],
     windows: Vec<Window>,
     held: HeldField,
+    wait: Wait,
+    upload_budget_bytes: Option<u64>,
+    last_time_s: Option<f64>,
+    last_eye: Option<[f64; 2]>,
     plan: UpdatePlan,
     generation: u64,
     view_constants: ViewConstants,
@@ -118,6 +162,7 @@ pub struct Clipmap {
     grounds: Vec<f64>,
     selection: Selection,
     scratch: Scratch,
+    arrivals: Arrivals,
     report: UpdateReport,
 }
 
@@ -128,16 +173,8 @@ impl Clipmap {
     /// [`ErrorKind::Misuse`] for options out of range; those of `levels`.
     pub fn new(levels: &dyn Levels, options: &ClipmapOptions) -> Result<Self> {
         let grid = *levels.grid();
+        options.check()?;
         let ring = options.ring()?;
-        if !options.vertical_scale.is_finite() {
-            let what = format!("{} is not finite", options.vertical_scale);
-            return Err(Error::new(ErrorKind::Misuse, "vertical scale", what));
-        }
-        if options.levels == Some(0) {
-            return Err(
-                Error::new(ErrorKind::Misuse, "levels", "0 levels draw nothing").advice("ask for at least 1")
-            );
-        }
         let fitting = grid.levels_until(ring.clip_size).min(levels.level_count());
         let count = options.levels.map_or(fitting, |l| l.min(fitting));
         Ok(Self {
@@ -150,6 +187,10 @@ impl Clipmap {
             range_m: height_range(levels)?,
             windows: (0..count).map(|l| Window::new(l, &grid, &ring)).collect(),
             held: HeldField::new(count, ring.held_size()),
+            wait: options.wait,
+            upload_budget_bytes: options.upload_budget_bytes,
+            last_time_s: None,
+            last_eye: None,
             plan: UpdatePlan::new(count),
             generation: 0,
             view_constants: bytemuck::Zeroable::zeroed(),
@@ -157,36 +198,46 @@ impl Clipmap {
             grounds: Vec::with_capacity(count as usize),
             selection: Selection::default(),
             scratch: Scratch::default(),
+            arrivals: Arrivals::default(),
             report: UpdateReport::default(),
         })
     }
 
     /// Moves the windows to where the view's eye is, reading what that exposes, and selects what to draw.
     ///
+    /// `time_s` is the time of the frame in seconds, from wherever it is counted: by it, data that arrive late fade
+    /// in. Where every frame waits for its data it changes nothing.
+    ///
     /// # Errors
-    /// [`ErrorKind::Misuse`] for a view of other than finite numbers; those of `levels`, after which the level that
-    /// could not be read is empty and is read again by the next update.
-    pub fn update(&mut self, levels: &dyn Levels, view: &View) -> Result<&UpdateReport> {
+    /// [`ErrorKind::Misuse`] for a view or a time of other than finite numbers; those of `levels`, after which what
+    /// could not be read is still missing and is read again by the next update. Without waiting, data that are
+    /// damaged or cannot be read are no error: the next coarser level is drawn, see [`Clipmap::take_faults`].
+    pub fn update(&mut self, levels: &dyn Levels, view: &View, time_s: f64) -> Result<&UpdateReport> {
         view.camera.check()?;
+        if !time_s.is_finite() {
+            return Err(Error::new(
+                ErrorKind::Misuse,
+                "time",
+                format!("{time_s} s is not finite"),
+            ));
+        }
         let eye = Eye::new(&view.camera, &self.grid);
         self.generation += 1;
-        self.plan.plan(&self.windows, &eye);
+        self.plan.begin(&self.windows, &eye);
         let mut exposed = 0;
         for plan in self.plan.levels() {
             let light_size = self.grid.level(light_level(plan.level));
             exposed += exposed_bytes(plan.level, plan.from, plan.to, light_size);
-            if plan.from != plan.to {
-                let window = &mut self.windows[plan.level as usize];
-                window.fill(levels, plan.to, &plan.heights, &plan.light, &mut self.scratch)?;
-            }
+            self.windows[plan.level as usize].move_to(plan.to);
         }
-        ground::grounds(
-            &self.windows,
-            &self.grid,
-            &eye,
-            self.range_m[0],
-            &mut self.grounds,
-        );
+        let fades = self.read_and_fade(levels, &eye, time_s)?;
+        let ground = Ground {
+            windows: &self.windows,
+            grid: &self.grid,
+            held: &self.held,
+            least_m: self.range_m[0],
+        };
+        ground::grounds(&ground, &eye, &mut self.grounds);
         self.view_constants = ViewConstants::new(view, &eye, &self.grid, &self.ring, self.vertical_scale);
         self.level_constants.clear();
         for level in 0..self.windows.len() {
@@ -210,6 +261,12 @@ impl Clipmap {
             frustum: self.cull.then_some(&frustum),
             vertical_scale: self.vertical_scale,
         });
+        // A level that the camera's climb has dropped shows nothing, late or not.
+        let shown = |level: usize| self.level_constants[level].climb < self.view_constants.reach;
+        let shown = (0..self.windows.len() - 1).filter(|l| shown(*l));
+        let stale_levels = shown.clone().filter(|l| fades.held[*l]).count() as u32;
+        let pops = shown.map(|l| fades.pops[l]).sum();
+        let coarsest_there = self.windows[self.windows.len() - 1].missing().next().is_none();
         self.report = UpdateReport {
             uploads: self.plan.uploads() as u64,
             upload_bytes: self.plan.bytes(),
@@ -218,14 +275,43 @@ impl Clipmap {
             patches_culled: self.selection.culled,
             triangles: self.selection.triangles(),
             levels_drawn: self.selection.levels.count_ones(),
-            complete: self
-                .plan
-                .levels()
-                .iter()
-                .all(|p| self.windows[p.level as usize].resident() == p.to),
+            complete: stale_levels == 0 && coarsest_there,
+            stale_levels,
+            pops,
             cut: self.cut,
         };
         Ok(&self.report)
+    }
+
+    /// Reads what the windows miss, and holds back what has not arrived.
+    fn read_and_fade(&mut self, levels: &dyn Levels, eye: &Eye, time_s: f64) -> Result<FadeReport> {
+        let samples = eye.samples();
+        let moved = self.last_eye.map_or(0.0, |last| {
+            (samples[0] - last[0]).abs().max((samples[1] - last[1]).abs())
+        });
+        let passed_s = self.last_time_s.map_or(0.0, |last| (time_s - last).max(0.0));
+        (self.last_eye, self.last_time_s) = (Some(samples), Some(time_s));
+        let (windows, plan, scratch) = (&mut self.windows, &mut self.plan, &mut self.scratch);
+        if self.wait == Wait::All {
+            Arrivals::all(levels, windows, plan, scratch)?;
+            return Ok(FadeReport::default());
+        }
+        let budget = self.upload_budget_bytes;
+        self.arrivals.some(levels, windows, plan, scratch, eye, budget)?;
+        let moment = Moment {
+            grid: &self.grid,
+            eye,
+            reach: self.ring.reach() as f64,
+            moved,
+            passed_s,
+        };
+        Ok(self.held.update(&self.windows, &moment))
+    }
+
+    /// Takes the faults that updates without waiting have met since the last call: data that are damaged or cannot
+    /// be read, in whose place the next coarser level is drawn.
+    pub fn take_faults(&mut self) -> Vec<Error> {
+        std::mem::take(&mut self.arrivals.faults)
     }
 
     /// Where the samples lie.
@@ -263,7 +349,13 @@ impl Clipmap {
         &self.held
     }
 
-    /// What the last update exposed.
+    /// The same, to break it on purpose: controls of tests.
+    #[doc(hidden)]
+    pub fn held_mut(&mut self) -> &mut HeldField {
+        &mut self.held
+    }
+
+    /// What the last update wrote.
     pub fn plan(&self) -> &UpdatePlan {
         &self.plan
     }
@@ -299,7 +391,10 @@ fn height_range(levels: &dyn Levels) -> Result<[f32; 2]> {
     let coarsest = levels.level_count() - 1;
     let patches = levels.grid().patches(coarsest).rect();
     let mut bounds = vec![Bounds::VOID; patches.area() as usize];
-    arrived(levels.bounds(coarsest, patches, &mut bounds)?)?;
+    if levels.bounds(coarsest, patches, &mut bounds)? == Arrival::Missing {
+        let what = "the bounds of its coarsest level are not there";
+        return Err(Error::new(ErrorKind::Unsupported, "terrain", what).advice("wait for them first"));
+    }
     let low = bounds.iter().fold(f32::NAN, |low, b| low.min(b.need_min));
     let high = bounds.iter().fold(f32::NAN, |high, b| high.max(b.need_max));
     Ok(if low.is_nan() { [0.0, 0.0] } else { [low, high] })

@@ -1,4 +1,7 @@
-//! `UpdatePlan`: for each level the rectangles that cover exactly what a move of its window exposes.
+//! `UpdatePlan`: for each level the rectangles that an update writes.
+//!
+//! Where every frame waits for its data, they cover exactly what the moves of the windows expose. Where none does, or
+//! under a budget, they cover what has arrived of that and of what was missing before.
 
 use super::eye::Eye;
 use super::window::{LightTexel, Window};
@@ -9,11 +12,11 @@ use crate::grid::Rect;
 pub struct LevelPlan {
     /// The level.
     pub level: u32,
-    /// The resident samples before.
+    /// The samples that the window was for.
     pub from: Rect,
-    /// The resident samples after.
+    /// The samples that it is for now.
     pub to: Rect,
-    /// Disjoint rectangles of samples, split at the texture's seam, that are in `to` and not in `from`.
+    /// Disjoint rectangles of samples of `to`, split at the texture's seam, that are written.
     pub heights: Vec<Rect>,
     /// Disjoint rectangles of light texels, split at their texture's seam, over the same ground.
     pub light: Vec<Rect>,
@@ -40,21 +43,20 @@ impl UpdatePlan {
         }
     }
 
-    /// Plans the move of `windows` (by level, finest first) to where they belong for `eye`.
-    pub fn plan(&mut self, windows: &[Window], eye: &Eye) {
+    /// Begins an update that moves `windows` (by level, finest first) to where they belong for `eye`.
+    pub(super) fn begin(&mut self, windows: &[Window], eye: &Eye) {
         for plan in &mut self.levels {
             let window = &windows[plan.level as usize];
             plan.from = window.resident();
             plan.to = window.target(eye);
             plan.heights.clear();
             plan.light.clear();
-            for exposed in plan.to.difference(plan.from) {
-                plan.heights.extend(window.pieces(exposed));
-            }
-            for exposed in window.light_of(plan.to).difference(window.light_resident()) {
-                plan.light.extend(window.light_pieces(exposed));
-            }
         }
+    }
+
+    /// The levels' plans, coarse levels first, to be written to.
+    pub(super) fn levels_mut(&mut self) -> &mut [LevelPlan] {
+        &mut self.levels
     }
 
     /// The levels' plans, coarse levels first.

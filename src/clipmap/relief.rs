@@ -2,22 +2,24 @@
 
 use half::f16;
 
-use super::window::{LightTexel, Scratch, arrived};
+use super::window::{LightTexel, Scratch};
 use crate::error::Result;
 use crate::grid::Rect;
-use crate::levels::{Levels, LightSample};
+use crate::levels::{Arrival, Levels, LightSample};
 
 /// Reads `rect` of level `level` into `scratch.texels`.
-pub(super) fn read(source: &dyn Levels, level: u32, rect: Rect, scratch: &mut Scratch) -> Result<()> {
+pub(super) fn read(source: &dyn Levels, level: u32, rect: Rect, scratch: &mut Scratch) -> Result<Arrival> {
     let grid = source.grid();
     let around = rect.grown(1).intersection(grid.level(level).rect());
     scratch.relief.resize(around.area() as usize, 0.0);
-    arrived(source.heights(level, around, &mut scratch.relief)?)?;
+    if source.heights(level, around, &mut scratch.relief)? == Arrival::Missing {
+        return Ok(Arrival::Missing);
+    }
     scratch
         .shares
         .resize(rect.area() as usize, LightSample::default());
-    if source.has_light() {
-        arrived(source.light(level, rect, &mut scratch.shares)?)?;
+    if source.has_light() && source.light(level, rect, &mut scratch.shares)? == Arrival::Missing {
+        return Ok(Arrival::Missing);
     }
     let step = (1i64 << level) as f64;
     let spacing_m = grid.spacing_m.map(|s| (s * step) as f32);
@@ -40,7 +42,7 @@ pub(super) fn read(source: &dyn Levels, level: u32, rect: Rect, scratch: &mut Sc
                 [share.sun, share.sky, east, south]
             }),
     );
-    Ok(())
+    Ok(Arrival::Arrived)
 }
 
 /// The slope at `here` (rise over run, no unit) from its neighbours: central where both are there, one-sided where

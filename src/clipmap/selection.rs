@@ -117,6 +117,11 @@ impl Selection {
         if !scene.exists(patch) {
             return;
         }
+        if !scene.has_coarser(patch.level)
+            && !scene.windows[patch.level as usize].has_all_of(patch.a, patch.b)
+        {
+            return; // nothing is there that could be drawn instead
+        }
         if !scene.refined(patch) {
             self.draw(scene, patch);
             return;

@@ -42,7 +42,7 @@ pub fn displace(clipmap: &Clipmap, instance: &Instance, x: i32, z: i32) -> Verte
     let alpha = if level.has_coarser == 0 {
         0.0
     } else {
-        ring(view, d).max(held(clipmap.held(), level, instance.level, i, j))
+        ring(view, d).max(held(clipmap.held(), level.parent_last, instance.level, i, j))
     };
 
     let h = load_height(clipmap, instance.level, i, j);

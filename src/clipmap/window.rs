@@ -4,6 +4,8 @@ use half::f16;
 
 use super::constants::{Ring, VOID_HEIGHT, light_level};
 use super::eye::Eye;
+use super::missing::Missing;
+use super::plan::LevelPlan;
 use super::relief;
 use crate::error::Result;
 use crate::grid::{Grid, PATCH, Patch, Rect, Size, seam_pieces, slot};
@@ -21,7 +23,7 @@ pub struct PatchInfo {
 /// A texel of the light texture: share of the sun, share of the sky, slope to the east, slope to the south.
 pub type LightTexel = [f16; 4];
 
-/// The resident samples of a level around the camera, addressed toroidally.
+/// The samples of a level around the camera, addressed toroidally.
 #[derive(Clone, Debug)]
 pub struct Window {
     level: u32,
@@ -33,11 +35,11 @@ pub struct Window {
     light_n: i64,
     light_level_size: Size,
     light_shift: [i64; 2],
-    light_resident: Rect,
     light: Vec<LightTexel>,
     patch_slots: i64,
     patch_resident: Rect,
-    patches: Vec<PatchInfo>,
+    patches: Vec<Option<PatchInfo>>,
+    pub(super) missing: Missing,
 }
 
 impl Window {
@@ -56,17 +58,11 @@ impl Window {
             light_n,
             light_level_size: grid.level(light_level(level)),
             light_shift: grid.offset.map(|o| o >> light_level(level)),
-            light_resident: Rect::EMPTY,
             light: vec![LightTexel::default(); (light_n * light_n) as usize],
             patch_slots,
             patch_resident: Rect::EMPTY,
-            patches: vec![
-                PatchInfo {
-                    bounds: Bounds::VOID,
-                    voids: true
-                };
-                (patch_slots * patch_slots) as usize
-            ],
+            patches: vec![None; (patch_slots * patch_slots) as usize],
+            missing: Missing::default(),
         }
     }
 
@@ -75,14 +71,19 @@ impl Window {
         self.level
     }
 
-    /// The resident samples.
+    /// The samples that the window is for: all of them are resident but for those that are missing.
     pub fn resident(&self) -> Rect {
         self.resident
     }
 
-    /// The resident light texels, in samples of the level whose light this one holds.
+    /// The light texels over the same ground, in samples of the level whose light this one holds.
     pub fn light_resident(&self) -> Rect {
-        self.light_resident
+        self.light_of(self.resident)
+    }
+
+    /// The samples that have not arrived, as disjoint rectangles. Their light has not arrived either.
+    pub fn missing(&self) -> impl Iterator<Item = Rect> {
+        self.missing.rects()
     }
 
     /// Where the window of a level of `size` samples belongs for an eye: around it, but held within the level, so
@@ -138,9 +139,8 @@ impl Window {
 
     /// The height in metres above the DEM's base at sample (i, j), NaN for no data; none where it is not resident.
     pub fn height(&self, i: i64, j: i64) -> Option<f32> {
-        self.resident
-            .contains(i, j)
-            .then(|| self.heights[self.index(i, j)])
+        let arrived = self.resident.contains(i, j) && !self.missing.contains(i, j);
+        arrived.then(|| self.heights[self.index(i, j)])
     }
 
     /// What is in the slot of sample (i, j), be it that sample or another: what the shader reads.
@@ -163,89 +163,107 @@ impl Window {
         self.light_n
     }
 
-    /// What is known of patch (a, b); none where it has no resident sample.
+    /// What is known of patch (a, b); none where no sample of it has arrived.
     pub fn patch(&self, a: i64, b: i64) -> Option<&PatchInfo> {
-        self.patch_resident
-            .contains(a, b)
-            .then(|| &self.patches[self.patch_index(a, b)])
+        if !self.patch_resident.contains(a, b) {
+            return None;
+        }
+        self.patches[self.patch_index(a, b)].as_ref()
     }
 
-    /// Moves to `target`, reading into the mirror what `heights` and `light` list, which must be what is exposed.
+    /// Whether all samples of patch (a, b) that the window is for have arrived.
+    pub(super) fn has_all_of(&self, a: i64, b: i64) -> bool {
+        let samples = Patch::new(self.level, a, b).samples_within(self.size);
+        self.missing.is_empty() || self.missing.rects().all(|r| r.intersection(samples).is_empty())
+    }
+
+    /// Moves to `target`. What that exposes is missing until [`Window::fill`] has read it.
+    pub fn move_to(&mut self, target: Rect) {
+        if target == self.resident {
+            return;
+        }
+        self.missing.follow(self.resident, target);
+        let patches = target.touching_patches(self.size);
+        for gained in patches.difference(self.patch_resident) {
+            for (a, b) in gained.cells() {
+                let index = self.patch_index(a, b);
+                self.patches[index] = None;
+            }
+        }
+        self.resident = target;
+        self.patch_resident = patches;
+    }
+
+    /// Reads the samples `rect`, which must be missing, with their light and the bounds of their patches, into the
+    /// mirror; where they arrive, lists the rectangles that were written, split at the seams. Whoever calls takes
+    /// `rect` from what is missing.
     ///
     /// # Errors
-    /// Those of `source`. The window is then empty.
-    pub fn fill(
+    /// Those of `source`. The samples are then still missing.
+    pub(super) fn fill(
         &mut self,
         source: &dyn Levels,
-        target: Rect,
-        heights: &[Rect],
-        light: &[Rect],
+        rect: Rect,
+        written: &mut LevelPlan,
         scratch: &mut Scratch,
-    ) -> Result<()> {
-        let before = self.patch_resident;
-        self.resident = Rect::EMPTY;
-        self.light_resident = Rect::EMPTY;
-        self.patch_resident = Rect::EMPTY;
-        for &rect in heights {
-            scratch.heights.resize(rect.area() as usize, 0.0);
-            arrived(source.heights(self.level, rect, &mut scratch.heights)?)?;
+    ) -> Result<Arrival> {
+        let patches = rect.touching_patches(self.size).intersection(self.patch_resident);
+        let unknown = |(a, b)| self.patches[self.patch_index(a, b)].is_none();
+        let wants_bounds = patches.cells().any(unknown);
+        if wants_bounds {
+            scratch.bounds.resize(patches.area() as usize, Bounds::VOID);
+            if source.bounds(self.level, patches, &mut scratch.bounds)? == Arrival::Missing {
+                return Ok(Arrival::Missing);
+            }
+        }
+        for piece in seam_pieces(rect, self.n, self.shift) {
+            scratch.heights.resize(piece.area() as usize, 0.0);
+            if source.heights(self.level, piece, &mut scratch.heights)? == Arrival::Missing {
+                return Ok(Arrival::Missing);
+            }
             // A source of the caller's own may not know what stands for no data on the GPU.
             scratch
                 .heights
                 .iter_mut()
                 .filter(|h| **h == VOID_HEIGHT)
                 .for_each(|h| *h = f32::NAN);
-            let first = self.index(rect.x0, rect.z0);
-            copy_rows(&scratch.heights, &mut self.heights[first..], rect, self.n);
+            let first = self.index(piece.x0, piece.z0);
+            copy_rows(&scratch.heights, &mut self.heights[first..], piece, self.n);
         }
-        for &rect in light {
-            relief::read(source, light_level(self.level), rect, scratch)?;
-            let [x, z] = self.light_slot_of(rect.x0, rect.z0);
+        let light = self.light_of(rect);
+        for piece in seam_pieces(light, self.light_n, self.light_shift) {
+            if relief::read(source, light_level(self.level), piece, scratch)? == Arrival::Missing {
+                return Ok(Arrival::Missing);
+            }
+            let [x, z] = self.light_slot_of(piece.x0, piece.z0);
             let first = (z * self.light_n + x) as usize;
-            copy_rows(&scratch.texels, &mut self.light[first..], rect, self.light_n);
+            copy_rows(&scratch.texels, &mut self.light[first..], piece, self.light_n);
         }
-        self.resident = target;
-        self.light_resident = self.light_of(target);
-        self.fill_patches(
-            source,
-            before,
-            target.touching_patches(self.size),
-            heights,
-            scratch,
-        )
+        for (k, (a, b)) in patches.cells().enumerate() {
+            let bounds = if wants_bounds {
+                Some(scratch.bounds[k])
+            } else {
+                None
+            };
+            self.note_patch(a, b, bounds);
+        }
+        written.heights.extend(self.pieces(rect));
+        written.light.extend(self.light_pieces(light));
+        Ok(Arrival::Arrived)
     }
 
-    fn fill_patches(
-        &mut self,
-        source: &dyn Levels,
-        before: Rect,
-        target: Rect,
-        heights: &[Rect],
-        scratch: &mut Scratch,
-    ) -> Result<()> {
-        for rect in target.difference(before) {
-            scratch.bounds.resize(rect.area() as usize, Bounds::VOID);
-            arrived(source.bounds(self.level, rect, &mut scratch.bounds)?)?;
-            for ((a, b), &bounds) in rect.cells().zip(&scratch.bounds) {
-                let index = self.patch_index(a, b);
-                self.patches[index].bounds = bounds;
-            }
-        }
-        self.patch_resident = target;
-        // A patch keeps its flag when samples leave the window: it may then say void in vain, never the reverse.
-        for &rect in heights {
-            for (a, b) in rect.touching_patches(self.size).intersection(target).cells() {
-                let samples = Patch::new(self.level, a, b)
-                    .samples_within(self.size)
-                    .intersection(self.resident);
-                let voids = samples
-                    .cells()
-                    .any(|(i, j)| self.heights[self.index(i, j)].is_nan());
-                let index = self.patch_index(a, b);
-                self.patches[index].voids = voids;
-            }
-        }
-        Ok(())
+    /// Notes what is known of a patch some of whose samples have just been read. A patch keeps its flag when samples
+    /// leave the window or are not there yet: it may then say void in vain, never the reverse.
+    fn note_patch(&mut self, a: i64, b: i64, bounds: Option<Bounds>) {
+        let samples = Patch::new(self.level, a, b)
+            .samples_within(self.size)
+            .intersection(self.resident);
+        let voids = samples
+            .cells()
+            .any(|(i, j)| self.heights[self.index(i, j)].is_nan());
+        let index = self.patch_index(a, b);
+        let known = self.patches[index].map(|p| p.bounds);
+        self.patches[index] = known.or(bounds).map(|bounds| PatchInfo { bounds, voids });
     }
 
     fn index(&self, i: i64, j: i64) -> usize {
@@ -260,7 +278,7 @@ impl Window {
 
 /// Memory that is used anew at every update.
 #[derive(Clone, Debug, Default)]
-pub struct Scratch {
+pub(super) struct Scratch {
     heights: Vec<f32>,
     bounds: Vec<Bounds>,
     pub(super) relief: Vec<f32>,
@@ -273,18 +291,5 @@ fn copy_rows<T: Copy>(rows: &[T], slots: &mut [T], rect: Rect, n: i64) {
     let (width, n) = (rect.width() as usize, n as usize);
     for (row, out) in rows.chunks_exact(width).zip(slots.chunks_mut(n)) {
         out[..width].copy_from_slice(row);
-    }
-}
-
-/// The clipmap waits for its source; one that answers without the data cannot be drawn from.
-pub(super) fn arrived(arrival: Arrival) -> Result<()> {
-    match arrival {
-        Arrival::Arrived => Ok(()),
-        Arrival::Missing => Err(crate::Error::new(
-            crate::ErrorKind::Unsupported,
-            "terrain",
-            "data are missing that the frame needs",
-        )
-        .advice("use a source that waits for its data")),
     }
 }

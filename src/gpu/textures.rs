@@ -31,7 +31,7 @@ pub struct ViewTextures {
     pub(super) bind_group: wgpu::BindGroup,
     pub(super) instances: wgpu::Buffer,
     generation: u64,
-    held_generation: Option<u64>,
+    held_generations: Vec<Option<u64>>,
     sun: Sun,
     staging: Vec<f32>,
     instance_staging: Vec<Instance>,
@@ -130,7 +130,7 @@ impl ViewTextures {
             bind_group,
             instances: instance_buffer(device, &[bytemuck::Zeroable::zeroed(); 1024]),
             generation: 0,
-            held_generation: None,
+            held_generations: vec![None; levels as usize],
             sun,
             staging: Vec::new(),
             instance_staging: Vec::new(),
@@ -255,19 +255,18 @@ impl ViewTextures {
         report.bytes += rect.area() as u64 * LIGHT_BYTES;
     }
 
-    /// The held field is small; a change of it writes all its grids.
+    /// A level's grid of the held field is small; a change writes all of it.
     fn write_held(&mut self, queue: &wgpu::Queue, clipmap: &Clipmap) {
         let field = clipmap.held();
-        if self.held_generation == Some(field.generation()) {
-            return;
-        }
         let grid = Rect::new(0, 0, field.size(), field.size());
-        for level in 0..clipmap.windows().len() as u32 {
-            let bytes = bytemuck::cast_slice(field.grid(level));
-            let row_bytes = field.size() as u32 * size_of::<f32>() as u32;
-            write(queue, &self.held, level, [0, 0], grid, bytes, row_bytes);
+        for (level, held) in (0..).zip(&mut self.held_generations) {
+            if *held != Some(field.generation(level)) {
+                let bytes = bytemuck::cast_slice(field.grid(level));
+                let row_bytes = field.size() as u32 * size_of::<f32>() as u32;
+                write(queue, &self.held, level, [0, 0], grid, bytes, row_bytes);
+                *held = Some(field.generation(level));
+            }
         }
-        self.held_generation = Some(field.generation());
     }
 
     fn write_instances(&mut self, queue: &wgpu::Queue, clipmap: &Clipmap) {

@@ -124,15 +124,15 @@ impl Headless {
         })
     }
 
-    /// Draws the frame that `camera` sees.
+    /// Draws the frame that `camera` sees at `time_s` seconds of its flight.
     ///
     /// # Errors
     /// [`ErrorKind::Misuse`] for a camera of other than finite numbers, [`ErrorKind::Device`] where the device fails;
     /// those of `levels`.
-    pub fn frame(&mut self, levels: &dyn Levels, camera: &crate::Camera) -> Result<Frame> {
+    pub fn frame(&mut self, levels: &dyn Levels, camera: &crate::Camera, time_s: f64) -> Result<Frame> {
         let start = Instant::now();
         let view = View::new(*camera, self.options.size_px)?;
-        let update = *self.clipmap.update(levels, &view)?;
+        let update = *self.clipmap.update(levels, &view, time_s)?;
         let planned = Instant::now();
         let upload = self
             .renderer
@@ -245,6 +245,11 @@ impl Headless {
     /// Width and height of the frames in pixels.
     pub fn size_px(&self) -> [u32; 2] {
         self.options.size_px
+    }
+
+    /// Takes the faults that frames have met since the last call without ending, see [`Clipmap::take_faults`].
+    pub fn take_faults(&mut self) -> Vec<Error> {
+        self.clipmap.take_faults()
     }
 
     /// The clipmap as of the last frame.

@@ -78,7 +78,7 @@ impl Recording {
                 return Err(Error::cancelled(self.folder.display()));
             }
             let camera = flight.camera_at_frame(k);
-            let frame = headless.frame(levels, &camera)?;
+            let frame = headless.frame(levels, &camera, flight.time_of_frame_s(k))?;
             write_png(&self.picture(k), width, height, &frame.rgba8)?;
             if let Some(sheet) = sheet.as_mut().filter(|s| s.wants(k - frames.start)) {
                 sheet.add(k - frames.start, &frame.rgba8)?;
@@ -147,7 +147,7 @@ pub fn picture(
     if !force {
         refuse_existing(path)?;
     }
-    let frame = headless.frame(levels, camera)?;
+    let frame = headless.frame(levels, camera, 0.0)?;
     if progress.cancelled() {
         return Err(Error::cancelled(path.display()));
     }
@@ -184,5 +184,7 @@ fn frame_stats(frame: &Frame, k: u64, t_s: f64, camera: &Camera) -> FrameStats {
         upload_bytes_exposed: frame.update.upload_bytes_exposed,
         complete: frame.update.complete,
         cut: frame.update.cut,
+        stale_levels: frame.update.stale_levels,
+        pops: frame.update.pops,
     }
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::cli::{values, view_values};
+use crate::clipmap::Wait;
 use crate::light::Sun;
 use crate::shade::ViewMode;
 
@@ -90,6 +91,14 @@ pub(in crate::cli) struct ViewArgs {
     /// Width of the morph band in steps of a level, 0 to N/4 - 10 [default: N/10]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(i64).range(0..), allow_negative_numbers = true)]
     pub(in crate::cli) transition: Option<i64>,
+
+    /// Whether frames wait for all of their data, or are drawn with what is there [default: all]
+    #[arg(long, value_name = "all|none", value_parser = view_values::wait, default_value = "all", hide_default_value = true)]
+    pub(in crate::cli) wait: Wait,
+
+    /// The most bytes uploaded for a frame, beside the coarsest level; with --wait none
+    #[arg(long, value_name = "BYTES", value_parser = values::bytes)]
+    pub(in crate::cli) upload_budget: Option<u64>,
 
     /// Factor on heights
     #[arg(long, short = 'z', value_name = "S", value_parser = values::number, default_value = "1")]

@@ -1,0 +1,204 @@
+//! Arrivals: reading what windows miss, coarse levels first, within a frame's budget.
+
+use super::eye::Eye;
+use super::missing::distance;
+use super::plan::{HEIGHT_BYTES, LIGHT_BYTES, UpdatePlan};
+use super::window::{Scratch, Window};
+use crate::error::{Error, ErrorKind, Result};
+use crate::grid::Rect;
+use crate::levels::{Arrival, Levels};
+
+/// Samples along a side of the tiles that data come in: nothing that is asked for at once crosses their borders, so
+/// that a tile which is late, or damaged, holds up no other.
+const TILE: i64 = 256;
+
+/// Whether frames wait for their data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wait {
+    /// Every frame has all of its data, and the same camera makes the same picture.
+    #[default]
+    All,
+    /// A frame is drawn with what is there, and from the next coarser surface where that is not enough.
+    None,
+}
+
+/// What an update's reading met.
+#[derive(Debug, Default)]
+pub(super) struct Arrivals {
+    /// Faults that did not end it, each about rectangles that stay missing.
+    pub(super) faults: Vec<Error>,
+    wanted: Vec<(u32, Rect)>,
+}
+
+impl Clone for Arrivals {
+    /// Faults stay with the original: each is reported once.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl Arrivals {
+    /// Reads all that `windows` miss, and lists what is written in `plan`.
+    ///
+    /// # Errors
+    /// Those of `levels`, and [`ErrorKind::Unsupported`] where it answers without the data.
+    pub(super) fn all(
+        levels: &dyn Levels,
+        windows: &mut [Window],
+        plan: &mut UpdatePlan,
+        scratch: &mut Scratch,
+    ) -> Result<()> {
+        for written in plan.levels_mut() {
+            let window = &mut windows[written.level as usize];
+            each(window, |window, rect| {
+                match window.fill(levels, rect, written, scratch)? {
+                    Arrival::Arrived => Ok(Rect::EMPTY),
+                    Arrival::Missing => {
+                        let what = "data are missing that the frame needs";
+                        Err(Error::new(ErrorKind::Unsupported, "terrain", what)
+                            .advice("draw without waiting, or use a source that waits for its data"))
+                    }
+                }
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Reads what is there of what `windows` miss, near ground first, until `budget_bytes` of samples are written.
+    /// The coarsest level is beyond any budget: without it nothing can be drawn.
+    ///
+    /// # Errors
+    /// Those of `levels` but for data that are damaged or cannot be read, which stay missing and are noted.
+    pub(super) fn some(
+        &mut self,
+        levels: &dyn Levels,
+        windows: &mut [Window],
+        plan: &mut UpdatePlan,
+        scratch: &mut Scratch,
+        eye: &Eye,
+        budget_bytes: Option<u64>,
+    ) -> Result<()> {
+        let coarsest = windows.len() as u32 - 1;
+        let mut left_bytes = budget_bytes.unwrap_or(u64::MAX);
+        self.wanted.clear();
+        for written in plan.levels_mut() {
+            let window = &mut windows[written.level as usize];
+            let at = eye.samples().map(|s| s / (1i64 << written.level) as f64);
+            window.missing.by_tile(TILE, at);
+            let level = written.level;
+            self.wanted
+                .extend(window.missing.waiting().iter().map(|r| (level, *r)));
+        }
+        if !self.wanted.is_empty() {
+            levels.want(&self.wanted);
+        }
+        let faults = &mut self.faults;
+        for written in plan.levels_mut() {
+            let window = &mut windows[written.level as usize];
+            let at = eye.samples().map(|s| s / (1i64 << written.level) as f64);
+            each(window, |window, rect| {
+                let limit = if window.level() == coarsest {
+                    u64::MAX
+                } else {
+                    left_bytes
+                };
+                let part = affordable(window, rect, at, limit);
+                if part.is_empty() {
+                    return Ok(rect);
+                }
+                match window.fill(levels, part, written, scratch) {
+                    Ok(Arrival::Arrived) if window.level() == coarsest => {}
+                    Ok(Arrival::Arrived) => left_bytes -= bytes(window, part),
+                    Ok(Arrival::Missing) => return Ok(rect),
+                    Err(error) if matches!(error.kind(), ErrorKind::Broken | ErrorKind::Io) => {
+                        window.missing.lose(part);
+                        faults.push(error);
+                    }
+                    Err(error) => return Err(error),
+                }
+                rect.difference(part).for_each(|rest| window.missing.wait(rest));
+                Ok(Rect::EMPTY)
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// Hands every rectangle that `window` waits for to `read`, which answers with what is still to be waited for.
+fn each(window: &mut Window, mut read: impl FnMut(&mut Window, Rect) -> Result<Rect>) -> Result<()> {
+    let taken = window.missing.take();
+    let mut result = Ok(());
+    for &rect in &taken {
+        let rest = match &result {
+            Ok(()) => read(window, rect).unwrap_or_else(|error| {
+                result = Err(error);
+                rect
+            }),
+            Err(_) => rect,
+        };
+        window.missing.wait(rest);
+    }
+    window.missing.done(taken);
+    result
+}
+
+/// The bytes of samples that `rect` writes.
+fn bytes(window: &Window, rect: Rect) -> u64 {
+    let light = window.light_of(rect);
+    rect.area() as u64 * HEIGHT_BYTES + light.area() as u64 * LIGHT_BYTES
+}
+
+/// The part of `rect` that `limit_bytes` pay for: whole rows where that is one, else a part of a row; from the side
+/// that is nearer to `eye` (in samples of the level).
+fn affordable(window: &Window, rect: Rect, eye: [f64; 2], limit_bytes: u64) -> Rect {
+    if bytes(window, rect) <= limit_bytes {
+        return rect;
+    }
+    let row = Rect {
+        z1: rect.z0 + 1,
+        ..rect
+    };
+    let rows = count(limit_bytes, bytes(window, row), rect.height());
+    if rows > 0 {
+        let south = Rect {
+            z0: rect.z1 - rows,
+            ..rect
+        };
+        let north = Rect {
+            z1: rect.z0 + rows,
+            ..rect
+        };
+        return if distance(south, eye) < distance(north, eye) {
+            south
+        } else {
+            north
+        };
+    }
+    let sample = Rect {
+        x1: rect.x0 + 1,
+        ..row
+    };
+    let columns = count(limit_bytes, bytes(window, sample), rect.width());
+    if columns == 0 {
+        return Rect::EMPTY;
+    }
+    let east = Rect {
+        x0: rect.x1 - columns,
+        ..row
+    };
+    let west = Rect {
+        x1: rect.x0 + columns,
+        ..row
+    };
+    if distance(east, eye) < distance(west, eye) {
+        east
+    } else {
+        west
+    }
+}
+
+/// How many of at most `most` parts of `part_bytes` each fit into `limit_bytes`. The first part of a rectangle never
+/// has fewer bytes of light than another: only a level's last samples lack some.
+fn count(limit_bytes: u64, part_bytes: u64, most: i64) -> i64 {
+    i64::try_from(limit_bytes / part_bytes.max(1)).map_or(most, |n| n.min(most))
+}
