@@ -10,6 +10,7 @@ mod eye;
 mod frustum;
 mod ground;
 mod held;
+mod identity;
 mod plan;
 mod relief;
 mod selection;
@@ -29,6 +30,7 @@ use crate::camera::View;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Grid;
 use crate::levels::{Bounds, Levels};
+use identity::Identity;
 use window::{Scratch, arrived};
 
 /// How a clipmap is laid out.
@@ -102,6 +104,7 @@ pub struct UpdateReport {
 /// The clipmap of one view.
 #[derive(Clone, Debug)]
 pub struct Clipmap {
+    identity: Identity,
     grid: Grid,
     ring: Ring,
     vertical_scale: f64,
@@ -141,6 +144,7 @@ impl Clipmap {
         let fitting = grid.levels_until(ring.clip_size).min(levels.level_count());
         let count = options.levels.map_or(fitting, |l| l.min(fitting));
         Ok(Self {
+            identity: Identity::new(),
             grid,
             ring,
             vertical_scale: options.vertical_scale,
@@ -167,8 +171,8 @@ impl Clipmap {
     /// [`ErrorKind::Misuse`] for a view of other than finite numbers; those of `levels`, after which the level that
     /// could not be read is empty and is read again by the next update.
     pub fn update(&mut self, levels: &dyn Levels, view: &View) -> Result<&UpdateReport> {
-        view.camera.check()?;
-        let eye = Eye::new(&view.camera, &self.grid);
+        view.check()?;
+        let eye = Eye::new(view.eye, &self.grid);
         self.generation += 1;
         self.plan.plan(&self.windows, &eye);
         let mut exposed = 0;
@@ -226,6 +230,11 @@ impl Clipmap {
             cut: self.cut,
         };
         Ok(&self.report)
+    }
+
+    /// A number that no other clipmap of this process has, clones included.
+    pub fn identity(&self) -> u64 {
+        self.identity.get()
     }
 
     /// Where the samples lie.
