@@ -77,6 +77,6 @@ fn fragment(in: Varyings) -> Fragment {
     }
     var out: Fragment;
     out.colour = point_colour(GroundPoint(from_eye, mix(in.start.w, in.end.w, u), 1.0, in.level));
-    out.depth = view.near_m * inverse_w;
+    out.depth = view.depth.x + view.depth.y * inverse_w;
     return out;
 }

@@ -12,7 +12,7 @@ use crate::clipmap::{LEVEL_SLOTS, VOID_HEIGHT};
 use crate::grid::PATCH;
 use crate::light::Sun;
 
-/// What a frame shows.
+/// What a frame shows: for each of these a function `view_NAME` in `shaders/shared/views.wgsl`, and a name below.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ViewMode {
     /// Ground colours in light and air.
@@ -20,21 +20,24 @@ pub enum ViewMode {
     Shaded,
     /// The bare light, grey.
     Light,
-    /// A colour per level, whiter where a level morphs into the next.
+    /// A colour per level: whiter where the ring slides it into the next one, darker where it is held.
     Level,
+    /// The edges of the triangles that are drawn, over the ground.
+    Wire,
 }
 
 impl ViewMode {
     /// All modes with the names by which people ask for them.
-    pub const NAMED: [(&'static str, Self); 3] = [
+    pub const NAMED: [(&'static str, Self); 4] = [
         ("shaded", Self::Shaded),
         ("light", Self::Light),
         ("level", Self::Level),
+        ("wire", Self::Wire),
     ];
 
-    /// The number by which the shader knows it.
-    pub fn index(self) -> u32 {
-        self as u32
+    /// Its name, which is also that of its function in the shader.
+    pub fn name(self) -> &'static str {
+        Self::NAMED[self as usize].0
     }
 }
 
@@ -108,6 +111,8 @@ pub const SKY_BELOW: Vec3 = Vec3::new(0.30, 0.38, 0.48);
 pub const SUN_GLOW: Vec3 = Vec3::new(0.55, 0.42, 0.22);
 /// Exposure before the tone curve `1 - exp(-x)`.
 pub const EXPOSURE: f32 = 0.85;
+/// Width in pixels of the edges that the wire view draws.
+pub const WIRE_PX: f32 = 1.0;
 /// Interpolated validity below which a fragment belongs to a hole. A corner's share of a triangle may round to a few
 /// ulps above 0 along the opposite side; 2^-16 of a triangle is below any pixel.
 pub const VALID_LEAST: f32 = 1.0 - 1.0 / 65536.0;
@@ -122,8 +127,6 @@ pub fn wgsl_constants() -> String {
     let vector = |v: Vec3| format!("vec3<f32>({:?}, {:?}, {:?})", v.x, v.y, v.z);
     line("LEVEL_SLOTS", format!("{LEVEL_SLOTS}u"));
     line("PATCH_CORNERS", format!("{}u", PATCH + 1));
-    line("VIEW_LIGHT", format!("{}u", ViewMode::Light.index()));
-    line("VIEW_LEVEL", format!("{}u", ViewMode::Level.index()));
     for (name, value) in [
         ("VOID_HEIGHT", VOID_HEIGHT),
         ("LIGHT_VIEW_SUN", LIGHT_VIEW[0]),
@@ -135,6 +138,7 @@ pub fn wgsl_constants() -> String {
         ("RELIEF_LEAST_M", RELIEF_LEAST_M),
         ("HAZE_SCALE_M", HAZE_SCALE_M),
         ("EXPOSURE", EXPOSURE),
+        ("WIRE_PX", WIRE_PX),
         ("VALID_LEAST", VALID_LEAST),
     ] {
         line(name, float(value));
@@ -157,4 +161,16 @@ pub fn wgsl_constants() -> String {
         line(name, vector(value));
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_view_has_its_own_name() {
+        for (k, (name, mode)) in ViewMode::NAMED.into_iter().enumerate() {
+            assert_eq!((mode as usize, mode.name()), (k, name));
+        }
+    }
 }

@@ -5,7 +5,7 @@ mod support;
 
 use clipscape::camera::{Camera, View};
 use clipscape::clipmap::{Clipmap, ClipmapOptions, VOID_HEIGHT, Vertex, displace, light_level};
-use clipscape::gpu::{compose, read};
+use clipscape::gpu::{Parts, compose, read};
 use clipscape::grid::{Grid, PATCH};
 use clipscape::levels::Levels;
 use clipscape::light::Sun;
@@ -157,7 +157,7 @@ fn probe(@builtin(global_invocation_id) id: vec3<u32>) {
         return Vec::new();
     }
     let count = instances.len() * 81;
-    let source = compose("probe.wgsl", PROBE).unwrap().source;
+    let source = compose("probe.wgsl", PROBE, &Parts::default()).unwrap().source;
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: None,
         source: wgpu::ShaderSource::Wgsl(source.into()),

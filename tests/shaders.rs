@@ -4,11 +4,15 @@
 use std::collections::HashSet;
 
 use clipscape::clipmap::{LevelConstants, ViewConstants};
-use clipscape::gpu::{SkyConstants, compose, entry_files};
-use clipscape::shade::ShadeConstants;
+use clipscape::gpu::{Parts, compose, entry_files};
+use clipscape::shade::{ShadeConstants, ViewMode};
 
 fn source(name: &str) -> String {
-    compose("test.wgsl", &format!("#import {name}\n"))
+    source_of(name, &Parts::default())
+}
+
+fn source_of(name: &str, parts: &Parts<'_>) -> String {
+    compose("test.wgsl", &format!("#import {name}\n"), parts)
         .unwrap_or_else(|e| panic!("{e}"))
         .source
 }
@@ -52,8 +56,47 @@ fn every_shader_validates_and_no_binding_is_used_twice() {
 }
 
 #[test]
+fn every_view_validates_with_and_without_a_function_of_the_caller_s() {
+    // The example in the documentation of RendererOptions::surface.
+    let documentation = include_str!("../src/gpu/options.rs");
+    let lines = documentation
+        .lines()
+        .map(|l| l.trim_start().trim_start_matches("///"));
+    let example = lines
+        .skip_while(|l| !l.contains("fn surface_colour(point: SurfacePoint) -> vec4<f32> {"))
+        .take_while(|l| !l.contains("```"));
+    let example: String = example.flat_map(|l| [l, "\n"]).collect();
+    assert!(example.contains("height_m / 100.0"), "{example}");
+    for (name, view_mode) in ViewMode::NAMED {
+        for surface in [None, Some(example.as_str())] {
+            for file in ["terrain.wgsl", "closer.wgsl"] {
+                let module = parse(&source_of(file, &Parts { view_mode, surface }));
+                validate(&module).unwrap_or_else(|e| panic!("{file}, {name}: {e}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_documented_of_a_surface_point_is_what_the_shader_has() {
+    let members = |text: &str| -> Vec<String> {
+        let lines = text
+            .lines()
+            .map(|l| l.trim_start().trim_start_matches("///").trim());
+        let body = lines.skip_while(|l| !l.starts_with("struct SurfacePoint {"));
+        body.take_while(|l| !l.starts_with('}'))
+            .map(str::to_string)
+            .collect()
+    };
+    let documented = members(include_str!("../src/gpu/options.rs"));
+    assert!(documented.len() > 9);
+    assert_eq!(documented, members(include_str!("../shaders/shared/point.wgsl")));
+}
+
+#[test]
 fn control_an_invalid_shader_is_caught() {
-    let spoiled = source("terrain.wgsl").replace("return tone(radiance);", "return radiance.x;");
+    let spoiled = source("terrain.wgsl").replace("return vec4(tone(radiance), 1.0);", "return radiance.x;");
+    assert_ne!(spoiled, source("terrain.wgsl"));
     let caught = match naga::front::wgsl::parse_str(&spoiled) {
         Ok(module) => validate(&module).is_err(),
         Err(_) => true,
@@ -97,6 +140,9 @@ fn mirrored_structs_have_the_layout_that_shaders_read() {
         clip_from_east,
         clip_from_up,
         clip_from_south,
+        ray_right,
+        ray_up,
+        ray_middle,
         anchor,
         fraction,
         spacing_m,
@@ -109,7 +155,7 @@ fn mirrored_structs_have_the_layout_that_shaders_read() {
         transition,
         slot_mask,
         held_mask,
-        padding,
+        depth,
     });
     assert_eq!(ours, layout(&terrain, "ViewConstants"));
     let ours = our_layout!(LevelConstants {
@@ -131,8 +177,6 @@ fn mirrored_structs_have_the_layout_that_shaders_read() {
         slope_scale
     });
     assert_eq!(ours, layout(&terrain, "ShadeConstants"));
-    let ours = our_layout!(SkyConstants { right, up, forward });
-    assert_eq!(ours, layout(&source("sky.wgsl"), "SkyConstants"));
 }
 
 #[test]

@@ -214,12 +214,7 @@ fn alpha_s_facts_hold_over_random_scenes() {
         let mut clipmap = Clipmap::new(&scene.levels, &scene.options).unwrap();
         clipmap.update(&scene.levels, &scene.view, 0.0).unwrap();
         let faults = faults(&clipmap, &clipmap);
-        let place = || {
-            format!(
-                "seed {seed}, scene {k}: {:?} {:?}",
-                scene.options, scene.view.camera.eye
-            )
-        };
+        let place = || format!("seed {seed}, scene {k}: {:?} {:?}", scene.options, scene.view.eye);
         assert!(
             faults.is_empty(),
             "{}: {} faults: {:?}",
@@ -256,7 +251,7 @@ fn control_a_selection_that_lags_behind_the_shader_is_caught() {
         clipmap.update(&scene.levels, &scene.view, 0.0).unwrap();
         let mut moved = clipmap.clone();
         let spacing_m = scene.levels.grid.spacing_m;
-        scene.view.camera.eye += DVec3::new(20.0 * spacing_m[0], 0.0, 20.0 * spacing_m[1]);
+        scene.view.eye += DVec3::new(20.0 * spacing_m[0], 0.0, 20.0 * spacing_m[1]);
         moved.update(&scene.levels, &scene.view, 0.0).unwrap();
         caught += u32::from(!faults(&clipmap, &moved).is_empty());
     }
@@ -307,7 +302,8 @@ fn culling_leaves_out_only_what_is_not_seen() {
             ),
             heading_deg: random.uniform(0.0, 360.0),
             pitch_deg: random.uniform(-90.0, 10.0),
-            ..scene.view.camera
+            roll_deg: 0.0,
+            fov_deg: 60.0,
         };
         let view = View::new(camera, [64, 64]).unwrap();
         let draw = |cull| {

@@ -170,7 +170,7 @@ fn windows_hold_all_that_the_ring_reaches() {
         let level = random.pick(&[0u32, 1, 2, 3]);
         let size = grid.level(level);
         let (x, z) = (random.uniform(-100.0, 6000.0), random.uniform(-100.0, 1300.0));
-        let eye = clipscape::clipmap::Eye::new(&view(x, z).camera, &grid);
+        let eye = clipscape::clipmap::Eye::new(view(x, z).eye, &grid);
         let window = clipscape::clipmap::Window::placed(size, n, level, &eye);
         let (reach, step) = ((n / 2 - 2) as f64, (1i64 << level) as f64);
         let within = |e: f64, samples: i64| {

@@ -7,6 +7,9 @@ struct ViewConstants {
     clip_from_east: vec4<f32>,  // clip coordinates of a metre to the east of the eye
     clip_from_up: vec4<f32>,
     clip_from_south: vec4<f32>,
+    ray_right: vec4<f32>,       // what the picture's right edge adds to ray_middle
+    ray_up: vec4<f32>,          // what its upper edge adds
+    ray_middle: vec4<f32>,      // metres from the eye to the picture's middle, at distance 1 along the view axis
     anchor: vec2<i32>,          // the level-0 sample on which positions are based
     fraction: vec2<f32>,        // samples from the anchor to the eye
     spacing_m: vec2<f32>,       // metres between columns and rows of level 0
@@ -14,12 +17,12 @@ struct ViewConstants {
     edge: vec2<f32>,            // samples from the eye to the DEM's last column and row
     size_px: vec2<f32>,         // of the picture
     vertical_scale: f32,
-    near_m: f32,                // nearest drawn distance, which is clip z
+    near_m: f32,                // nearest drawn distance along the view axis
     reach: f32,                 // R, in steps of a level
     transition: f32,            // T, in steps of a level
     slot_mask: i32,             // clip size - 1
     held_mask: i32,             // slots along a side of the held field - 1
-    padding: vec2<f32>,
+    depth: vec2<f32>,           // a and b of clip z = a w + b
 }
 
 struct LevelConstants {
@@ -117,6 +120,6 @@ fn displace(origin: vec2<i32>, level: u32, fill: f32, corner: vec2<i32>) -> Vert
     vertex.height = height;
     vertex.alpha = alpha;
     vertex.void = void;
-    vertex.clip = vec4(position.x, position.y, view.near_m, position.w);
+    vertex.clip = vec4(position.x, position.y, view.depth.x * position.w + view.depth.y, position.w);
     return vertex;
 }

@@ -1,13 +1,15 @@
 //! The camera: where it stands, where it looks, and how it projects.
 //!
 //! The world is right-handed in metres: x east, y up, z south. Heading turns clockwise from north (north is
-//! -z), pitch turns up, roll tilts the camera's right side down. Depth is reversed and has no far end:
-//! near / distance along the view axis.
+//! -z), pitch turns up, roll tilts the camera's right side down. Depth is reversed and has no far end, near / distance
+//! along the view axis, unless a [`View`] says otherwise.
 
+mod depth;
 mod flight;
 mod view;
 mod whole;
 
+pub use depth::{Depth, DepthDirection};
 pub use flight::{Flight, Key};
 pub use view::{MAX_PICTURE_PX, View, check_picture};
 pub use whole::overview;

@@ -1,12 +1,19 @@
-//! A camera and the picture it makes: the projection from eye-relative metres to clip space.
+//! What is seen: an eye, the projection from metres around it to clip space, and the size of the picture.
+//!
+//! A view is made of a [`Camera`], or of the matrices that a program has already. Whatever follows takes it from the
+//! rows that this file computes: for a point p, in metres east, up and south of the eye, clip x, y and w are the dot
+//! products of p with three rows, and clip z is `a w + b` ([`Depth`]).
 
-use glam::DVec3;
+use glam::{DMat3, DMat4, DVec3, DVec4};
 
-use super::{Camera, sin_cos_degrees};
+use super::{Camera, Depth, sin_cos_degrees};
 use crate::error::{Error, ErrorKind, Result};
 
 /// The greatest width and height of a picture in pixels: WebGPU's default limit of a texture.
 pub const MAX_PICTURE_PX: u32 = 8192;
+
+/// The share by which a matrix may miss what it must be: matrices are often made in f32.
+const SLACK: f64 = 1e-5;
 
 /// Refuses a picture of no or too many pixels.
 ///
@@ -25,48 +32,229 @@ pub fn check_picture(size_px: [u32; 2]) -> Result<()> {
     .advice(format!("each side may be 1 to {MAX_PICTURE_PX}")))
 }
 
-/// A camera and the size of its picture.
+/// What is seen, and the size of its picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// The camera.
-    pub camera: Camera,
-    /// Width and height of the picture.
+    /// Position of the eye in world metres, before vertical scale.
+    pub eye: DVec3,
+    /// Width and height of the picture in pixels.
     pub size_px: [u32; 2],
+    clip_rows: [DVec3; 3],
+    rays: [DVec3; 3],
+    depth: Option<Depth>,
 }
 
 impl View {
-    /// The view of `camera` in a picture of `size_px` pixels.
+    /// The view of `camera` in a picture of `size_px` pixels. Its depth is reversed and without a far end, from the
+    /// DEM's own near distance on ([`crate::clipmap::near_m`]); [`View::with_depth`] sets another.
     ///
     /// # Errors
     /// [`ErrorKind::Misuse`] for a camera that [`Camera::check`] refuses or a picture of no or too many pixels.
     pub fn new(camera: Camera, size_px: [u32; 2]) -> Result<Self> {
         camera.check()?;
         check_picture(size_px)?;
-        Ok(Self { camera, size_px })
-    }
-
-    /// Tangents of half the horizontal and half the vertical field of view.
-    pub fn half_tangents(&self) -> [f64; 2] {
+        let axes = camera.axes();
         // tan(a / 2) = sin a / (1 + cos a): exact at the angles where sine and cosine are.
-        let (sin, cos) = sin_cos_degrees(self.camera.fov_deg);
-        let vertical = sin / (1.0 + cos);
-        let aspect = f64::from(self.size_px[0]) / f64::from(self.size_px[1]);
-        [vertical * aspect, vertical]
+        let (sin, cos) = sin_cos_degrees(camera.fov_deg);
+        let tan_y = sin / (1.0 + cos);
+        let tan_x = tan_y * (f64::from(size_px[0]) / f64::from(size_px[1]));
+        Ok(Self {
+            eye: camera.eye,
+            size_px,
+            clip_rows: [axes.col(0) / tan_x, axes.col(1) / tan_y, axes.col(2)],
+            rays: [axes.col(0) * tan_x, axes.col(1) * tan_y, axes.col(2)],
+            depth: None,
+        })
     }
 
-    /// What takes a point, in metres east, up and south of the eye, to clip space: clip x, clip y and clip w
-    /// are the dot products with these rows. Clip w is the distance along the view axis; clip z is the near
-    /// distance, whatever the point (reversed, infinite depth).
-    pub fn clip_rows(&self) -> [DVec3; 3] {
-        let axes = self.camera.axes();
-        let [tan_x, tan_y] = self.half_tangents();
-        [axes.col(0) / tan_x, axes.col(1) / tan_y, axes.col(2)]
+    /// The view of a program that has matrices of its own.
+    ///
+    /// `view` takes world metres (x east, y up, z south; before vertical scale) to the eye's: right-handed, x to the
+    /// right, y up, z backward. It must be rigid: a rotation and a translation.
+    ///
+    /// `projection` takes the eye's metres to wgpu's clip space: x to the right, y up, depth 0 to 1. Any perspective is
+    /// good: off-axis (a tile of a picture, one eye of two), of any aspect whatever the picture's, rotated within the
+    /// picture, depth reversed or forward, its far end finite or not. The terrain's depths are those of the projection,
+    /// so that it and whatever else is drawn with the same matrices share one depth buffer.
+    ///
+    /// Make the matrices in f64: far from the world's origin a translation in f32 is too coarse.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] for matrices that are not finite, a view that scales, shears or mirrors, a projection that is
+    /// orthographic, left-handed, mirrored or singular or that has an oblique near plane, and a picture of no or too many
+    /// pixels.
+    pub fn from_matrices(view: DMat4, projection: DMat4, size_px: [u32; 2]) -> Result<Self> {
+        check_picture(size_px)?;
+        let (rotation, eye) = rigid(view)?;
+        let ([xx, xy, xz], [yx, yy, yz], depth) = perspective(projection)?;
+        // Rows of the rotation are the eye's axes in the world: right, up, backward.
+        let [right, up, backward] = [0, 1, 2].map(|k| rotation.row(k));
+        let clip_rows = [
+            right * xx + up * xy + backward * xz,
+            right * yx + up * yy + backward * yz,
+            -backward,
+        ];
+        let from_rows = |[x, y, w]: [DVec3; 3]| DMat3::from_cols(x, y, w).transpose();
+        // The direction whose clip x, y, w are given: its inverse's columns are those of 1, 0, 0 and so on.
+        let rays = from_rows(clip_rows).inverse();
+        let rays = [rays.x_axis, rays.y_axis, rays.z_axis];
+        if !(rays.iter().chain(&clip_rows)).all(|r| r.is_finite() && r.length_squared() > 0.0) {
+            return Err(projection_error("is singular"));
+        }
+        Ok(Self {
+            eye,
+            size_px,
+            clip_rows,
+            rays,
+            depth: Some(depth),
+        })
     }
+
+    /// The same view with another depth.
+    #[must_use]
+    pub fn with_depth(mut self, depth: Depth) -> Self {
+        self.depth = Some(depth);
+        self
+    }
+
+    /// The view that sees terrain drawn with `vertical_scale` as this one would see it if its heights were scaled, as
+    /// [`Camera::scaled_down`]: an eye's height is in metres before the scale.
+    #[must_use]
+    pub fn scaled_down(mut self, vertical_scale: f64) -> Self {
+        if vertical_scale != 0.0 {
+            self.eye.y /= vertical_scale;
+        }
+        self
+    }
+
+    /// Refuses an eye that is not finite and a picture of no or too many pixels: both may have been set since.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`], naming the value.
+    pub fn check(&self) -> Result<()> {
+        if !self.eye.is_finite() {
+            let what = format!("the eye at {} is not finite", self.eye);
+            return Err(Error::new(ErrorKind::Misuse, "view", what));
+        }
+        check_picture(self.size_px)
+    }
+
+    /// The rows of clip x, clip y and clip w: dot products with them take a point, in metres east, up and south of the
+    /// eye, to clip space. Clip w is the distance along the view axis.
+    pub fn clip_rows(&self) -> [DVec3; 3] {
+        self.clip_rows
+    }
+
+    /// What the picture's points look along: at distance 1 along the view axis lie, in metres east, up and south of the
+    /// eye, the picture's middle (the third) and from there half its width to the right (the first) and half its height
+    /// up (the second).
+    pub fn rays(&self) -> [DVec3; 3] {
+        self.rays
+    }
+
+    /// Its depth; none where that is the DEM's own, see [`View::new`].
+    pub fn depth(&self) -> Option<Depth> {
+        self.depth
+    }
+}
+
+/// Rotation and eye of a view matrix.
+fn rigid(view: DMat4) -> Result<(DMat3, DVec3)> {
+    let misuse = |what: &str| Error::new(ErrorKind::Misuse, "view matrix", what);
+    if !view.is_finite() {
+        return Err(misuse("is not finite"));
+    }
+    let rotation = DMat3::from_mat4(view);
+    let bottom = view.row(3);
+    if bottom.truncate() != DVec3::ZERO || bottom.w != 1.0 {
+        return Err(misuse("has a last row other than 0, 0, 0, 1")
+            .advice("give the projection as a matrix of its own"));
+    }
+    let stretch = rotation * rotation.transpose() - DMat3::IDENTITY;
+    if !stretch.abs_diff_eq(DMat3::ZERO, SLACK) {
+        return Err(misuse("scales or shears").advice("give a rotation and a translation in metres"));
+    }
+    if rotation.determinant() < 0.0 {
+        return Err(misuse("mirrors: its axes are left-handed")
+            .advice("use x to the right, y up and z backward, as in glam's rh views"));
+    }
+    // The point that it takes to the origin, also where it is rigid but for rounding.
+    let eye = -(rotation.inverse() * view.w_axis.truncate());
+    Ok((rotation, eye))
+}
+
+fn projection_error(what: &str) -> Error {
+    Error::new(ErrorKind::Misuse, "projection matrix", what)
+}
+
+/// A perspective projection by its clip x and clip y, each the factors on the eye's x, y and z, and its depth; all of them
+/// for a clip w of -z.
+fn perspective(matrix: DMat4) -> Result<([f64; 3], [f64; 3], Depth)> {
+    if !matrix.is_finite() {
+        return Err(projection_error("is not finite"));
+    }
+    let [x, y, z, w] = [0, 1, 2, 3].map(|k| matrix.row(k));
+    // Whether the listed entries of a row are nothing beside its others.
+    let none = |row: DVec4, entries: &[usize]| {
+        let greatest = row.abs().max_element();
+        entries.iter().all(|&k| row[k].abs() <= SLACK * greatest)
+    };
+    if w.z == 0.0 && w.w != 0.0 {
+        return Err(projection_error("is orthographic").advice("terrain is drawn in perspective"));
+    }
+    if w.z > 0.0 {
+        return Err(projection_error("looks along +z: it is left-handed")
+            .advice("use a right-handed one, whose clip w is -z"));
+    }
+    if w.z == 0.0 || !none(w, &[0, 1, 3]) {
+        return Err(projection_error("has a clip w other than -z").advice("put all rotation into the view"));
+    }
+    if !none(x, &[3]) || !none(y, &[3]) {
+        return Err(projection_error("is not centred on the eye").advice("put the translation into the view"));
+    }
+    if !none(z, &[0, 1]) {
+        return Err(
+            projection_error("has an oblique near plane").advice("use one whose clip z depends on z alone")
+        );
+    }
+    let turn = x.x * y.y - x.y * y.x;
+    if turn == 0.0 {
+        return Err(projection_error("is singular"));
+    }
+    if turn < 0.0 {
+        return Err(projection_error("mirrors the picture").advice("wgpu's clip space has y up"));
+    }
+    let unit = -w.z;
+    let depth = Depth::from_terms(-z.z / unit, z.w / unit)?;
+    let factors = |row: DVec4| [row.x / unit, row.y / unit, row.z / unit];
+    Ok((factors(x), factors(y), depth))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::DepthDirection;
+    use glam::dcamera::lh;
+    use glam::dcamera::rh::proj::{directx, vulkan};
+
+    const CAMERA: Camera = Camera {
+        eye: DVec3::new(3e5, 1234.5, -7e4),
+        heading_deg: 33.0,
+        pitch_deg: -12.0,
+        roll_deg: 71.0,
+        fov_deg: 47.0,
+    };
+
+    /// The view matrix of a camera.
+    fn view_matrix(camera: &Camera) -> DMat4 {
+        let axes = camera.axes();
+        let rows = DMat3::from_cols(axes.col(0), axes.col(1), -axes.col(2)).transpose();
+        DMat4::from_mat3_translation(rows, -(rows * camera.eye))
+    }
+
+    fn close(a: [DVec3; 3], b: [DVec3; 3], slack: f64) -> bool {
+        (0..3).all(|k| a[k].abs_diff_eq(b[k], slack * b[k].length()))
+    }
 
     #[test]
     fn the_frustum_s_corner_is_at_one() {
@@ -87,14 +275,151 @@ mod tests {
 
     #[test]
     fn pictures_without_pixels_are_refused() {
-        let camera = Camera {
-            eye: DVec3::ZERO,
-            heading_deg: 0.0,
-            pitch_deg: 0.0,
-            roll_deg: 0.0,
-            fov_deg: 90.0,
+        assert!(View::new(CAMERA, [0, 5]).is_err());
+        assert!(View::new(CAMERA, [5, MAX_PICTURE_PX + 1]).is_err());
+        let projection = directx::perspective_infinite_reverse(1.0, 1.0, 1.0);
+        assert!(View::from_matrices(view_matrix(&CAMERA), projection, [0, 5]).is_err());
+    }
+
+    #[test]
+    fn matrices_see_what_the_camera_sees() {
+        let size_px = [300, 200];
+        let of_camera = View::new(CAMERA, size_px).unwrap();
+        let fov = CAMERA.fov_deg.to_radians();
+        for (projection, near, far, direction) in [
+            (
+                directx::perspective_infinite_reverse(fov, 1.5, 0.25),
+                0.25,
+                f64::INFINITY,
+                DepthDirection::Reversed,
+            ),
+            (
+                directx::perspective_infinite(fov, 1.5, 0.25),
+                0.25,
+                f64::INFINITY,
+                DepthDirection::Forward,
+            ),
+            (
+                directx::perspective(fov, 1.5, 2.0, 5e4),
+                2.0,
+                5e4,
+                DepthDirection::Forward,
+            ),
+            (
+                directx::perspective(fov, 1.5, 5e4, 2.0),
+                2.0,
+                5e4,
+                DepthDirection::Reversed,
+            ),
+        ] {
+            // A projection's common factor is no part of it.
+            for factor in [1.0, 3.0] {
+                let view = View::from_matrices(view_matrix(&CAMERA), projection * factor, size_px).unwrap();
+                assert!(view.eye.abs_diff_eq(CAMERA.eye, 1e-9));
+                assert!(close(view.clip_rows(), of_camera.clip_rows(), 1e-14));
+                assert!(close(view.rays(), of_camera.rays(), 1e-14));
+                let depth = view.depth().unwrap();
+                assert_eq!(depth.direction(), direction);
+                assert!((depth.near_m() / near - 1.0).abs() < 1e-12, "{depth:?}");
+                assert!(
+                    depth.far_m() == far || (depth.far_m() / far - 1.0).abs() < 1e-9,
+                    "{depth:?}"
+                );
+            }
+        }
+        assert_eq!(of_camera.depth(), None);
+        let infinite = directx::perspective_infinite_reverse(fov, 1.5, 0.25);
+        let view = View::from_matrices(view_matrix(&CAMERA), infinite, size_px).unwrap();
+        assert_eq!(view.depth().unwrap().terms(), [0.0, 0.25], "to the bit");
+    }
+
+    #[test]
+    fn rays_and_rows_agree_with_the_matrices_off_the_axis_and_turned() {
+        let view = view_matrix(&CAMERA);
+        let off_axis = directx::frustum(-0.3, 1.1, -0.2, 0.9, 1.0, 1e5);
+        let turned = DMat4::from_rotation_z(0.5) * off_axis;
+        for projection in [off_axis, turned] {
+            let seen = View::from_matrices(view, projection, [64, 64]).unwrap();
+            let [right, up, middle] = seen.rays();
+            for (x, y) in [(0.0, 0.0), (1.0, -1.0), (-0.25, 0.75)] {
+                let ray = right * x + up * y + middle;
+                let point = CAMERA.eye + ray * 700.0;
+                let clip = projection * view * point.extend(1.0);
+                assert!((clip.x / clip.w - x).abs() < 1e-9 && (clip.y / clip.w - y).abs() < 1e-9);
+                assert!((clip.w - 700.0).abs() < 1e-6);
+                let [cx, cy, cw] = seen.clip_rows().map(|row| row.dot(point - seen.eye));
+                assert!(
+                    (cx - clip.x).abs() < 1e-6 && (cy - clip.y).abs() < 1e-6 && (cw - clip.w).abs() < 1e-6
+                );
+                let [a, b] = seen.depth().unwrap().terms();
+                assert!((a * cw + b - clip.z).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn matrices_that_are_no_view_are_refused_with_what_is_wrong() {
+        let projection = directx::perspective_infinite_reverse(1.0, 1.0, 1.0);
+        let good = view_matrix(&CAMERA);
+        let nan = |mut m: DMat4| {
+            m.y_axis.x = f64::NAN;
+            m
         };
-        assert!(View::new(camera, [0, 5]).is_err());
-        assert!(View::new(camera, [5, MAX_PICTURE_PX + 1]).is_err());
+        let shear = DMat4::from_mat3(DMat3::from_cols(DVec3::X, DVec3::new(0.5, 1.0, 0.0), DVec3::Z));
+        for (view, word) in [
+            (nan(good), "finite"),
+            (DMat4::from_scale(DVec3::splat(2.0)) * good, "scales"),
+            (
+                DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0)) * good,
+                "left-handed",
+            ),
+            (shear * good, "shears"),
+            (DMat4::ZERO, "last row"),
+            (projection * good, "last row"),
+        ] {
+            let error = View::from_matrices(view, projection, [64, 64]).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::Misuse);
+            assert!(error.to_string().contains(word), "{error}: {word}");
+        }
+        let near_oblique = {
+            let mut m = directx::perspective(1.0, 1.0, 1.0, 9.0);
+            m.x_axis.z = 0.3;
+            m
+        };
+        for (projection, word) in [
+            (nan(projection), "finite"),
+            (
+                directx::orthographic(-1.0, 1.0, -1.0, 1.0, 1.0, 9.0),
+                "orthographic",
+            ),
+            (lh::proj::directx::perspective(1.0, 1.0, 1.0, 9.0), "left-handed"),
+            (vulkan::perspective(1.0, 1.0, 1.0, 9.0), "mirrors"),
+            (
+                DMat4::from_scale(DVec3::new(0.0, 1.0, 1.0)) * projection,
+                "singular",
+            ),
+            (near_oblique, "oblique"),
+            (DMat4::ZERO, "clip w"),
+            (projection * DMat4::from_rotation_x(0.2), "clip w"),
+            (projection * DMat4::from_translation(DVec3::X), "centred"),
+            (
+                DMat4::from_scale(DVec3::new(1.0, 1.0, 0.0)) * projection,
+                "distance",
+            ),
+        ] {
+            let error = View::from_matrices(good, projection, [64, 64]).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::Misuse);
+            assert!(error.to_string().contains(word), "{error}: {word}");
+        }
+        // Made in f32, a view is rigid but for rounding.
+        assert!(View::from_matrices(good.as_mat4().as_dmat4(), projection, [64, 64]).is_ok());
+    }
+
+    #[test]
+    fn an_eye_set_to_no_number_is_noticed() {
+        let mut view = View::new(CAMERA, [64, 64]).unwrap();
+        assert!(view.check().is_ok());
+        view.eye.x = f64::NAN;
+        assert_eq!(view.check().unwrap_err().kind(), ErrorKind::Misuse);
     }
 }

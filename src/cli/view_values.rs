@@ -122,7 +122,7 @@ mod tests {
         for (name, mode) in ViewMode::NAMED {
             assert_eq!(view(name), Ok(mode));
         }
-        assert!(view("wires").unwrap_err().contains("shaded, light, level"));
+        assert!(view("wires").unwrap_err().contains("shaded, light, level, wire"));
         assert_eq!((msaa("1"), msaa("4")), (Ok(1), Ok(4)));
         assert!(msaa("2").is_err());
     }

@@ -3,6 +3,7 @@
 //! The same structs stand in `shaders/shared/surface.wgsl`; a test compares their layouts.
 
 use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
 
 use super::Eye;
 use crate::camera::View;
@@ -19,12 +20,18 @@ pub const LEVEL_SLOTS: usize = MAX_LEVELS as usize;
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct ViewConstants {
-    /// Clip x, y, z, w of a metre to the east of the eye. Clip z is always 0 here.
+    /// Clip x, y, z, w of a metre to the east of the eye. Clip z follows from clip w.
     pub clip_from_east: [f32; 4],
     /// Clip x, y, z, w of a metre up.
     pub clip_from_up: [f32; 4],
     /// Clip x, y, z, w of a metre to the south.
     pub clip_from_south: [f32; 4],
+    /// What the right edge of the picture adds to `ray_middle`; the fourth is unused.
+    pub ray_right: [f32; 4],
+    /// What its upper edge adds.
+    pub ray_up: [f32; 4],
+    /// Metres east, up and south of the eye to the picture's middle, at distance 1 along the view axis.
+    pub ray_middle: [f32; 4],
     /// The level-0 sample on which all positions are based, in the DEM's own indices.
     pub anchor: [i32; 2],
     /// Samples from the anchor to the eye.
@@ -39,7 +46,7 @@ pub struct ViewConstants {
     pub size_px: [f32; 2],
     /// Factor on heights relative to the eye.
     pub vertical_scale: f32,
-    /// Nearest drawn distance in metres, which is clip z.
+    /// Nearest drawn distance along the view axis in metres.
     pub near_m: f32,
     /// A level's reach R in its own steps.
     pub reach: f32,
@@ -49,8 +56,8 @@ pub struct ViewConstants {
     pub slot_mask: i32,
     /// Slots along a side of the held field's grids, less one.
     pub held_mask: i32,
-    /// Fills the struct to the multiple of 16 bytes that shaders expect.
-    pub padding: [f32; 2],
+    /// The terms a and b of clip z = `a w + b`.
+    pub depth: [f32; 2],
 }
 
 /// Constants of a level.
@@ -141,13 +148,21 @@ impl ViewConstants {
     /// The constants of a view.
     pub fn new(view: &View, eye: &Eye, grid: &Grid, ring: &Ring, vertical_scale: f64) -> Self {
         let [x, y, w] = view.clip_rows();
+        let near = near_m(grid);
+        let depth = view.depth();
+        let [a, b] = depth.map_or([0.0, near], |d| d.terms());
         let column = |c: [f64; 3]| [c[0] as f32, c[1] as f32, 0.0, c[2] as f32];
+        let ray = |r: DVec3| [r.x as f32, r.y as f32, r.z as f32, 0.0];
+        let [right, up, middle] = view.rays().map(ray);
         let edge =
             |axis: usize, samples: i64| ((samples - 1 - eye.anchor[axis]) as f64 - eye.fraction[axis]) as f32;
         Self {
             clip_from_east: column([x.x, y.x, w.x]),
             clip_from_up: column([x.y, y.y, w.y]),
             clip_from_south: column([x.z, y.z, w.z]),
+            ray_right: right,
+            ray_up: up,
+            ray_middle: middle,
             anchor: eye
                 .anchor
                 .map(|a| i32::try_from(a).expect("anchors stay within 2^23 samples of the DEM")),
@@ -157,17 +172,18 @@ impl ViewConstants {
             edge: [edge(0, grid.size.width), edge(1, grid.size.height)],
             size_px: view.size_px.map(|s| s as f32),
             vertical_scale: vertical_scale as f32,
-            near_m: near_m(grid) as f32,
+            near_m: depth.map_or(near, |d| d.near_m()) as f32,
             reach: ring.reach() as f32,
             transition: ring.transition as f32,
             slot_mask: ring.clip_size as i32 - 1,
             held_mask: ring.held_size() as i32 - 1,
-            padding: [0.0; 2],
+            depth: [a as f32, b as f32],
         }
     }
 }
 
-/// Nearest drawn distance along the view axis: 2^-10 of the smaller spacing, in metres.
+/// Nearest drawn distance along the view axis of a view without a depth of its own: 2^-10 of the smaller spacing, in
+/// metres. Its depth is reversed and has no far end.
 pub fn near_m(grid: &Grid) -> f64 {
     grid.spacing_m[0].min(grid.spacing_m[1]) / 1024.0
 }

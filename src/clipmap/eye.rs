@@ -1,6 +1,7 @@
 //! The eye as the clipmap knows it: an integer sample and a fraction, so that nothing on the GPU is absolute.
 
-use crate::camera::Camera;
+use glam::DVec3;
+
 use crate::grid::Grid;
 
 /// An eye farther than this many samples from the DEM is anchored at the DEM's nearest sample, so that indices from the
@@ -21,8 +22,8 @@ pub struct Eye {
 }
 
 impl Eye {
-    /// The eye of `camera` over `grid`.
-    pub fn new(camera: &Camera, grid: &Grid) -> Self {
+    /// The eye at `position`, in world metres before vertical scale, over `grid`.
+    pub fn new(position: DVec3, grid: &Grid) -> Self {
         let axis = |metres: f64, spacing_m: f64, samples: i64| {
             let at = metres / spacing_m;
             let nearest = at.clamp(0.0, (samples - 1) as f64);
@@ -33,12 +34,12 @@ impl Eye {
             };
             (anchor as i64, at - anchor)
         };
-        let x = axis(camera.eye.x, grid.spacing_m[0], grid.size.width);
-        let z = axis(camera.eye.z, grid.spacing_m[1], grid.size.height);
+        let x = axis(position.x, grid.spacing_m[0], grid.size.width);
+        let z = axis(position.z, grid.spacing_m[1], grid.size.height);
         Self {
             anchor: [x.0, z.0],
             fraction: [x.1, z.1],
-            height_m: camera.eye.y - grid.base_m,
+            height_m: position.y - grid.base_m,
         }
     }
 
@@ -60,17 +61,9 @@ impl Eye {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
 
     fn eye(x: f64, z: f64) -> Eye {
-        let camera = Camera {
-            eye: DVec3::new(x, 7.5, z),
-            heading_deg: 0.0,
-            pitch_deg: 0.0,
-            roll_deg: 0.0,
-            fov_deg: 60.0,
-        };
-        Eye::new(&camera, &Grid::new(100, 50, [2.0, 4.0]))
+        Eye::new(DVec3::new(x, 7.5, z), &Grid::new(100, 50, [2.0, 4.0]))
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod eye;
 mod frustum;
 mod ground;
 mod held;
+mod identity;
 mod missing;
 mod plan;
 mod relief;
@@ -35,6 +36,7 @@ use crate::levels::{Arrival, Bounds, Levels};
 use arrivals::Arrivals;
 use ground::Ground;
 use held::{FadeReport, Moment};
+use identity::Identity;
 use window::Scratch;
 
 /// How a clipmap is laid out.
@@ -142,6 +144,7 @@ pub struct UpdateReport {
 /// The clipmap of one view.
 #[derive(Clone, Debug)]
 pub struct Clipmap {
+    identity: Identity,
     grid: Grid,
     ring: Ring,
     vertical_scale: f64,
@@ -178,6 +181,7 @@ impl Clipmap {
         let fitting = grid.levels_until(ring.clip_size).min(levels.level_count());
         let count = options.levels.map_or(fitting, |l| l.min(fitting));
         Ok(Self {
+            identity: Identity::new(),
             grid,
             ring,
             vertical_scale: options.vertical_scale,
@@ -213,7 +217,7 @@ impl Clipmap {
     /// could not be read is still missing and is read again by the next update. Without waiting, data that are
     /// damaged or cannot be read are no error: the next coarser level is drawn, see [`Clipmap::take_faults`].
     pub fn update(&mut self, levels: &dyn Levels, view: &View, time_s: f64) -> Result<&UpdateReport> {
-        view.camera.check()?;
+        view.check()?;
         if !time_s.is_finite() {
             return Err(Error::new(
                 ErrorKind::Misuse,
@@ -221,7 +225,7 @@ impl Clipmap {
                 format!("{time_s} s is not finite"),
             ));
         }
-        let eye = Eye::new(&view.camera, &self.grid);
+        let eye = Eye::new(view.eye, &self.grid);
         self.generation += 1;
         self.plan.begin(&self.windows, &eye);
         let mut exposed = 0;
@@ -312,6 +316,11 @@ impl Clipmap {
     /// be read, in whose place the next coarser level is drawn.
     pub fn take_faults(&mut self) -> Vec<Error> {
         std::mem::take(&mut self.arrivals.faults)
+    }
+
+    /// A number that no other clipmap of this process has, clones included.
+    pub fn identity(&self) -> u64 {
+        self.identity.get()
     }
 
     /// Where the samples lie.

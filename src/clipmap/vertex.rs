@@ -21,7 +21,7 @@ pub struct Vertex {
     pub alpha: f32,
     /// Whether the vertex has no data: its triangles are holes.
     pub void: bool,
-    /// Clip space: x, y, near distance, distance along the view axis.
+    /// Clip space: x, y, z, and the distance along the view axis.
     pub clip: [f32; 4],
 }
 
@@ -75,12 +75,13 @@ pub fn displace(clipmap: &Clipmap, instance: &Instance, x: i32, z: i32) -> Verte
     let row = |k: usize| {
         view.clip_from_east[k] * east + view.clip_from_up[k] * up + view.clip_from_south[k] * south
     };
+    let w = row(3);
     Vertex {
         from_eye,
         height,
         alpha,
         void,
-        clip: [row(0), row(1), view.near_m, row(3)],
+        clip: [row(0), row(1), view.depth[0] * w + view.depth[1], w],
     }
 }
 

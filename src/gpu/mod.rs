@@ -3,15 +3,20 @@
 //! The caller owns device, queue, encoder and target; nothing here submits or waits but [`read`] and [`open`].
 
 mod device;
+mod options;
 mod readback;
 mod renderer;
+mod resident;
 mod shader;
 mod sky;
+mod staging;
 mod textures;
 
 pub use device::{Gpu, open};
+pub use options::RendererOptions;
 pub use readback::{Readback, read};
-pub use renderer::{ClipmapRenderer, DEPTH_FORMAT, DrawReport, RendererOptions};
-pub use shader::{Composed, ShaderError, compose, entry_files};
-pub use sky::{SkyConstants, SkyRenderer};
-pub use textures::{UploadReport, ViewTextures};
+pub use renderer::{ClipmapRenderer, DrawReport};
+pub use resident::UploadReport;
+pub use shader::{Composed, Parts, ShaderError, compose, entry_files};
+pub use sky::SkyRenderer;
+pub use textures::ViewTextures;

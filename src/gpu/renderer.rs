@@ -2,32 +2,14 @@
 
 use wgpu::util::DeviceExt as _;
 
+use super::options::RendererOptions;
+use super::resident::UploadReport;
 use super::shader;
-use super::textures::{UploadReport, ViewTextures};
+use super::textures::ViewTextures;
 use crate::clipmap::{CLOSER_TRIANGLES, Clipmap, Instance, PATCH_TRIANGLES, Side};
+use crate::error::{Error, ErrorKind, Result};
 use crate::grid::PATCH;
 use crate::light::Sun;
-use crate::shade::ViewMode;
-
-/// The depth format drawn into: 32-bit float, cleared to 0, nearer is greater.
-pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-
-/// What pipelines are made for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RendererOptions {
-    /// Format of the colour target. Formats without sRGB encoding get encoded colours.
-    pub colour_format: wgpu::TextureFormat,
-    /// Samples a pixel: 1 or 4.
-    pub sample_count: u32,
-    /// What is shown.
-    pub view_mode: ViewMode,
-    /// Whether the terrain has traced light ([`Clipmap::has_light`]); else light follows from slopes and sun.
-    pub traced_light: bool,
-    /// Whether the ground is tinted by height and slope.
-    pub tint: bool,
-    /// Whether air lies between ground and eye.
-    pub haze: bool,
-}
 
 /// What a draw did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,22 +29,26 @@ pub struct ClipmapRenderer {
     ragged: wgpu::RenderPipeline,
     closer: wgpu::RenderPipeline,
     indices: wgpu::Buffer,
+    options: RendererOptions,
 }
 
 impl ClipmapRenderer {
     /// Pipelines for `options`.
-    pub fn new(device: &wgpu::Device, options: &RendererOptions) -> Self {
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] for options that [`RendererOptions::check`] refuses, and for a surface function that does not
+    /// compile; its source is then a [`super::ShaderError`] with the line.
+    pub fn new(device: &wgpu::Device, options: &RendererOptions) -> Result<Self> {
+        options.check(device)?;
         let layout = bind_group_layout(device);
-        let module = shader::module(device, "terrain.wgsl");
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("clipscape terrain layout"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let closer = shader::module(device, "closer.wgsl");
-        let pipeline =
-            |label, module, ragged| pipeline(device, label, module, &pipeline_layout, options, ragged);
-        Self {
+        let pipelines = pipeline_layout(device, &layout);
+        let terrain = shader::module(device, "terrain.wgsl", &options.parts())?;
+        let closer = shader::module(device, "closer.wgsl", &options.parts())?;
+        let pipeline = |label, module, ragged| pipeline(device, label, module, &pipelines, options, ragged);
+        Ok(Self {
+            whole: pipeline("clipscape terrain whole patches", &terrain, Some(false))?,
+            ragged: pipeline("clipscape terrain ragged patches", &terrain, Some(true))?,
+            closer: pipeline("clipscape terrain closing triangles", &closer, None)?,
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("clipscape light sampler"),
                 address_mode_u: wgpu::AddressMode::Repeat,
@@ -71,20 +57,21 @@ impl ClipmapRenderer {
                 min_filter: wgpu::FilterMode::Linear,
                 ..Default::default()
             }),
-            whole: pipeline("clipscape terrain whole patches", &module, Some(false)),
-            ragged: pipeline("clipscape terrain ragged patches", &module, Some(true)),
-            closer: pipeline("clipscape terrain closing triangles", &closer, None),
             indices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                 label: Some("clipscape patch indices"),
                 contents: bytemuck::cast_slice(&patch_indices()),
                 usage: wgpu::BufferUsages::INDEX,
             }),
             layout,
-        }
+            options: options.clone(),
+        })
     }
 
     /// GPU state for a view of `clipmap`, lit by `sun` where no light was traced.
-    pub fn textures(&self, device: &wgpu::Device, clipmap: &Clipmap, sun: Sun) -> ViewTextures {
+    ///
+    /// # Errors
+    /// [`ErrorKind::Limit`] where the device's textures are too small for the clipmap.
+    pub fn textures(&self, device: &wgpu::Device, clipmap: &Clipmap, sun: Sun) -> Result<ViewTextures> {
         ViewTextures::new(device, &self.layout, &self.sampler, clipmap, sun)
     }
 
@@ -93,30 +80,45 @@ impl ClipmapRenderer {
         &self.layout
     }
 
-    /// Brings `textures` up to the clipmap's last update. What is written takes effect before the commands of the
-    /// queue's next submission.
-    pub fn upload(
-        &self,
-        queue: &wgpu::Queue,
-        clipmap: &Clipmap,
-        textures: &mut ViewTextures,
-    ) -> UploadReport {
-        textures.upload(queue, clipmap)
+    /// What these pipelines are made for.
+    pub fn options(&self) -> &RendererOptions {
+        &self.options
     }
 
-    /// Draws the clipmap's selection. The pass must have a colour target as in the options and a depth target of
-    /// [`DEPTH_FORMAT`], cleared to 0.
+    /// Records into `encoder` what brings `textures` up to the clipmap's last update; outside of a pass, before the one
+    /// that draws. It needs no queue: all of it is copies from mapped memory, which take effect where they are recorded.
+    /// So several views, and several updates of one, may share a submission. Encoders must be submitted in the order in
+    /// which updates were recorded into them; one that is dropped instead costs the next upload whole windows.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] for textures made for a clipmap of other sizes, a clipmap that has not been updated yet, and
+    /// a view whose depth is not that of the options; [`ErrorKind::Device`] where the device fails.
+    pub fn upload(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        clipmap: &Clipmap,
+        textures: &mut ViewTextures,
+    ) -> Result<UploadReport> {
+        textures.upload(encoder, clipmap, &self.options)
+    }
+
+    /// Draws the clipmap's selection. The pass must have a colour and a depth target as in the options, depth cleared to
+    /// [`RendererOptions::clear_depth`] before the first draw of the pass or pass before.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] where the clipmap's last update was not uploaded into `textures`; nothing is then drawn.
     pub fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         clipmap: &Clipmap,
         textures: &ViewTextures,
-    ) -> DrawReport {
+    ) -> Result<DrawReport> {
+        textures.check_drawable(clipmap, &self.options)?;
         let selection = clipmap.selection();
         let mut report = DrawReport::default();
-        pass.set_bind_group(0, &textures.bind_group, &[]);
+        pass.set_bind_group(0, textures.bind_group(), &[]);
         pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint16);
-        pass.set_vertex_buffer(0, textures.instances.slice(..));
+        pass.set_vertex_buffer(0, textures.instances().slice(..));
         let patch = 0..3 * PATCH_TRIANGLES as u32;
         let mut first = 0;
         let mut draw = |pass: &mut wgpu::RenderPass<'_>, indices: std::ops::Range<u32>, count: usize| {
@@ -139,11 +141,12 @@ impl ClipmapRenderer {
             closers = indices.end;
             draw(pass, indices, side.len());
         }
-        report
+        Ok(report)
     }
 }
 
-fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+/// The layout of a view's bind group.
+pub(super) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     use wgpu::ShaderStages as Stages;
     let uniform = wgpu::BindingType::Buffer {
         ty: wgpu::BufferBindingType::Uniform,
@@ -161,7 +164,7 @@ fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         (both, uniform),
         (both, uniform),
         (Stages::VERTEX | Stages::COMPUTE, texture(false)),
-        (Stages::VERTEX | Stages::COMPUTE, texture(false)),
+        (both | Stages::COMPUTE, texture(false)),
         (Stages::FRAGMENT, uniform),
         (Stages::FRAGMENT, texture(true)),
         (Stages::FRAGMENT, sampler),
@@ -186,6 +189,29 @@ fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     })
 }
 
+/// The layout of all pipelines.
+pub(super) fn pipeline_layout(device: &wgpu::Device, view: &wgpu::BindGroupLayout) -> wgpu::PipelineLayout {
+    device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("clipscape layout"),
+        bind_group_layouts: &[Some(view)],
+        immediate_size: 0,
+    })
+}
+
+/// What `create` makes, where the device has nothing against it.
+pub(super) fn created<T>(device: &wgpu::Device, label: &str, create: impl FnOnce() -> T) -> Result<T> {
+    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let made = create();
+    match pollster::block_on(scope.pop()) {
+        None => Ok(made),
+        Some(error) => Err(Error::new(
+            ErrorKind::Misuse,
+            label,
+            format!("cannot be made ({error})"),
+        )),
+    }
+}
+
 fn pipeline(
     device: &wgpu::Device,
     label: &str,
@@ -193,14 +219,13 @@ fn pipeline(
     layout: &wgpu::PipelineLayout,
     options: &RendererOptions,
     ragged: Option<bool>,
-) -> wgpu::RenderPipeline {
+) -> Result<wgpu::RenderPipeline> {
     let on = |flag: bool| f64::from(u8::from(flag));
     let mut constants = vec![
-        ("VIEW_MODE", f64::from(options.view_mode.index())),
         ("TRACED_LIGHT", on(options.traced_light)),
         ("TINT", on(options.tint)),
         ("HAZE", on(options.haze)),
-        ("ENCODE_SRGB", on(!options.colour_format.is_srgb())),
+        ("ENCODE_SRGB", on(options.encodes_srgb())),
     ];
     // Only patches are of two kinds; closing triangles may always have to be discarded.
     constants.extend(ragged.map(|ragged| ("RAGGED", on(ragged))));
@@ -208,40 +233,36 @@ fn pipeline(
         constants: &constants,
         ..Default::default()
     };
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(label),
-        layout: Some(layout),
-        vertex: wgpu::VertexState {
-            module,
-            entry_point: Some("vertex"),
-            compilation_options: compilation_options.clone(),
-            buffers: &[Some(wgpu::VertexBufferLayout {
-                array_stride: size_of::<Instance>() as u64,
-                step_mode: wgpu::VertexStepMode::Instance,
-                attributes: &wgpu::vertex_attr_array![0 => Sint32x2, 1 => Uint32, 2 => Float32],
-            })],
-        },
-        // No culling: closing triangles have no front, and terrain may be seen from below.
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH_FORMAT,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(wgpu::CompareFunction::Greater),
-            stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
-        multisample: wgpu::MultisampleState {
-            count: options.sample_count,
-            ..Default::default()
-        },
-        fragment: Some(wgpu::FragmentState {
-            module,
-            entry_point: Some("fragment"),
-            compilation_options,
-            targets: &[Some(options.colour_format.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
+    created(device, label, || {
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(label),
+            layout: Some(layout),
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: Some("vertex"),
+                compilation_options: compilation_options.clone(),
+                buffers: &[Some(wgpu::VertexBufferLayout {
+                    array_stride: size_of::<Instance>() as u64,
+                    step_mode: wgpu::VertexStepMode::Instance,
+                    attributes: &wgpu::vertex_attr_array![0 => Sint32x2, 1 => Uint32, 2 => Float32],
+                })],
+            },
+            // No culling: closing triangles have no front, and terrain may be seen from below.
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(options.depth_state(true, options.nearer())),
+            multisample: wgpu::MultisampleState {
+                count: options.sample_count,
+                ..Default::default()
+            },
+            fragment: Some(wgpu::FragmentState {
+                module,
+                entry_point: Some("fragment"),
+                compilation_options,
+                targets: &[Some(options.colour_format.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
     })
 }
 

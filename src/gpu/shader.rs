@@ -1,9 +1,15 @@
 //! Shaders put together: shared parts imported once, constants of the Rust side in front, lines traced back.
+//!
+//! Two parts are not files. `view colour` calls the function of the view that is asked for; `surface function` is the
+//! caller's own, where there is one, else `shared/look.wgsl`.
 
 use std::fmt;
 
+use crate::error::{Error, ErrorKind, Result};
+use crate::shade::ViewMode;
+
 /// The shader files, by the names under which they are imported.
-const FILES: [(&str, &str); 6] = [
+const FILES: [(&str, &str); 9] = [
     ("terrain.wgsl", include_str!("../../shaders/terrain.wgsl")),
     ("closer.wgsl", include_str!("../../shaders/closer.wgsl")),
     ("sky.wgsl", include_str!("../../shaders/sky.wgsl")),
@@ -16,6 +22,15 @@ const FILES: [(&str, &str); 6] = [
         include_str!("../../shaders/shared/ground.wgsl"),
     ),
     (
+        "shared/point.wgsl",
+        include_str!("../../shaders/shared/point.wgsl"),
+    ),
+    (
+        "shared/views.wgsl",
+        include_str!("../../shaders/shared/views.wgsl"),
+    ),
+    ("shared/look.wgsl", include_str!("../../shaders/shared/look.wgsl")),
+    (
         "shared/shade.wgsl",
         include_str!("../../shaders/shared/shade.wgsl"),
     ),
@@ -23,6 +38,21 @@ const FILES: [(&str, &str); 6] = [
 
 /// The name of what [`crate::shade::wgsl_constants`] puts in front of every shader.
 const PRELUDE: &str = "constants";
+
+/// The part that calls the function of a view.
+const VIEW_COLOUR: &str = "view colour";
+
+/// The part that colours a point of the ground.
+const SURFACE_FUNCTION: &str = "surface function";
+
+/// What is put together into a shader, besides files.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Parts<'a> {
+    /// The view whose function is called.
+    pub view_mode: ViewMode,
+    /// The caller's own surface function, see [`super::RendererOptions::surface`].
+    pub surface: Option<&'a str>,
+}
 
 /// The files that are whole shaders, not parts of others.
 pub fn entry_files() -> impl Iterator<Item = &'static str> {
@@ -41,7 +71,7 @@ pub struct Composed {
 }
 
 impl Composed {
-    /// The file and line from which line `line` (from 1) of the whole text came.
+    /// The file or part, and its line, from which line `line` (from 1) of the whole text came.
     pub fn origin(&self, line: usize) -> Option<(&str, u32)> {
         self.lines
             .get(line.checked_sub(1)?)
@@ -49,10 +79,11 @@ impl Composed {
     }
 }
 
-/// An import that cannot be followed.
+/// What is wrong with a shader, and where: an import that cannot be followed, or a caller's function that does not
+/// compile. It is the source of the [`Error`] that [`super::ClipmapRenderer::new`] returns.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ShaderError {
-    /// The file that imports.
+    /// The file, or `surface function`.
     pub file: String,
     /// Its line, from 1.
     pub line: u32,
@@ -72,61 +103,118 @@ impl std::error::Error for ShaderError {}
 ///
 /// # Errors
 /// An import that is malformed or unknown, with its place.
-pub fn compose(name: &str, text: &str) -> Result<Composed, ShaderError> {
-    let mut composed = Composed {
-        source: String::new(),
-        lines: Vec::new(),
+pub fn compose(name: &str, text: &str, parts: &Parts<'_>) -> Result<Composed, ShaderError> {
+    let mut composer = Composer {
+        parts,
+        seen: vec![name.to_string()],
+        out: Composed {
+            source: String::new(),
+            lines: Vec::new(),
+        },
     };
-    append(
-        &mut composed,
-        PRELUDE,
-        &crate::shade::wgsl_constants(),
-        &mut vec![],
-    )?;
-    append(&mut composed, name, text, &mut vec![name.to_string()])?;
-    Ok(composed)
+    composer.append(PRELUDE, &crate::shade::wgsl_constants())?;
+    composer.append(name, text)?;
+    Ok(composer.out)
 }
 
-/// The whole text of one of this crate's own shaders.
+struct Composer<'a> {
+    parts: &'a Parts<'a>,
+    seen: Vec<String>,
+    out: Composed,
+}
+
+impl Composer<'_> {
+    fn append(&mut self, file: &str, text: &str) -> Result<(), ShaderError> {
+        for (line, number) in text.lines().zip(1..) {
+            let error = |what: String| ShaderError {
+                file: file.to_string(),
+                line: number,
+                what,
+            };
+            let Some(rest) = line.trim_start().strip_prefix('#') else {
+                self.out.source.push_str(line);
+                self.out.source.push('\n');
+                self.out.lines.push((file.to_string(), number));
+                continue;
+            };
+            let import = rest.strip_prefix("import ").map(str::trim);
+            let import = import.ok_or_else(|| error(format!("expected `#import FILE`, found `{line}`")))?;
+            if self.seen.iter().any(|s| s == import) {
+                continue;
+            }
+            self.seen.push(import.to_string());
+            let text = self
+                .part(import)
+                .ok_or_else(|| error(format!("there is no shader file `{import}`")))?;
+            self.append(import, &text)?;
+        }
+        Ok(())
+    }
+
+    /// The text of a file or part.
+    fn part(&self, name: &str) -> Option<String> {
+        match (name, self.parts.surface) {
+            (VIEW_COLOUR, _) => Some(format!(
+                "fn view_colour(point: SurfacePoint) -> vec4<f32> {{ return view_{}(point); }}\n",
+                self.parts.view_mode.name()
+            )),
+            (SURFACE_FUNCTION, Some(own)) => Some(own.to_string()),
+            (SURFACE_FUNCTION, None) => Some("#import shared/look.wgsl\n".to_string()),
+            _ => FILES
+                .into_iter()
+                .find(|(file, _)| *file == name)
+                .map(|(_, text)| text.to_string()),
+        }
+    }
+}
+
+/// One of this crate's own shaders, with the parts asked for.
+///
+/// # Errors
+/// [`ErrorKind::Misuse`] where the caller's surface function does not compile, with its line.
 ///
 /// # Panics
-/// If the shader is unknown or its imports cannot be followed, which a test rules out for all of [`entry_files`].
-pub(super) fn module(device: &wgpu::Device, name: &str) -> wgpu::ShaderModule {
+/// If the shader is unknown, or its own imports cannot be followed, which a test rules out for all of [`entry_files`].
+pub(super) fn module(device: &wgpu::Device, name: &str, parts: &Parts<'_>) -> Result<wgpu::ShaderModule> {
     let (_, text) = FILES
         .into_iter()
         .find(|(file, _)| *file == name)
         .expect("the shader is one of FILES");
-    let composed = compose(name, text).expect("a test composes every entry file");
-    device.create_shader_module(wgpu::ShaderModuleDescriptor {
+    let composed = compose(name, text, parts).map_err(misfit)?;
+    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(&format!("clipscape {name}")),
-        source: wgpu::ShaderSource::Wgsl(composed.source.into()),
-    })
+        source: wgpu::ShaderSource::Wgsl(composed.source.as_str().into()),
+    });
+    let Some(error) = pollster::block_on(scope.pop()) else {
+        return Ok(module);
+    };
+    let info = pollster::block_on(module.get_compilation_info());
+    Err(misfit(explain(&composed, &info, &error)))
 }
 
-fn append(out: &mut Composed, file: &str, text: &str, seen: &mut Vec<String>) -> Result<(), ShaderError> {
-    for (line, number) in text.lines().zip(1..) {
-        let error = |what: String| ShaderError {
-            file: file.to_string(),
-            line: number,
-            what,
-        };
-        let Some(rest) = line.trim_start().strip_prefix('#') else {
-            out.source.push_str(line);
-            out.source.push('\n');
-            out.lines.push((file.to_string(), number));
-            continue;
-        };
-        let import = rest.strip_prefix("import ").map(str::trim);
-        let import = import.ok_or_else(|| error(format!("expected `#import FILE`, found `{line}`")))?;
-        if seen.iter().any(|s| s == import) {
-            continue;
-        }
-        seen.push(import.to_string());
-        let known = FILES.into_iter().find(|(name, _)| *name == import);
-        let (name, text) = known.ok_or_else(|| error(format!("there is no shader file `{import}`")))?;
-        append(out, name, text, seen)?;
+/// Where in the parts of a shader its compiler stumbled. A caller's function may be wrong only where it is called.
+fn explain(composed: &Composed, info: &wgpu::CompilationInfo, error: &wgpu::Error) -> ShaderError {
+    let first = info
+        .messages
+        .iter()
+        .find(|m| m.message_type == wgpu::CompilationMessageType::Error);
+    let place = first
+        .and_then(|m| m.location)
+        .and_then(|l| composed.origin(l.line_number as usize));
+    let (file, line) = place.unwrap_or((SURFACE_FUNCTION, 1));
+    ShaderError {
+        file: file.to_string(),
+        line,
+        what: first.map_or_else(|| error.to_string(), |m| m.message.clone()),
     }
-    Ok(())
+}
+
+fn misfit(error: ShaderError) -> Error {
+    let subject = format!("{}:{}", error.file, error.line);
+    Error::new(ErrorKind::Misuse, subject, &error.what)
+        .advice("it must define fn surface_colour(point: SurfacePoint) -> vec4<f32>")
+        .because(error)
 }
 
 #[cfg(test)]
@@ -136,7 +224,7 @@ mod tests {
     #[test]
     fn imports_are_followed_once_and_lines_traced_back() {
         let text = "#import shared/shade.wgsl\nfn mine() {}\n#import shared/shade.wgsl\n";
-        let composed = compose("test.wgsl", text).unwrap();
+        let composed = compose("test.wgsl", text, &Parts::default()).unwrap();
         assert_eq!(composed.source.matches("struct ShadeConstants").count(), 1);
         let line = composed.source.lines().position(|l| l == "fn mine() {}").unwrap() + 1;
         assert_eq!(composed.origin(line), Some(("test.wgsl", 2)));
@@ -152,15 +240,37 @@ mod tests {
 
     #[test]
     fn imports_that_lead_nowhere_are_errors_with_their_place() {
-        let error = compose("test.wgsl", "// a comment\n#import shared/none.wgsl\n").unwrap_err();
+        let error = compose(
+            "test.wgsl",
+            "// a comment\n#import shared/none.wgsl\n",
+            &Parts::default(),
+        )
+        .unwrap_err();
         assert_eq!(
             error.to_string(),
             "test.wgsl:2: there is no shader file `shared/none.wgsl`"
         );
-        let error = compose("test.wgsl", "#include x\n").unwrap_err();
+        let error = compose("test.wgsl", "#include x\n", &Parts::default()).unwrap_err();
         assert_eq!(
             error.to_string(),
             "test.wgsl:1: expected `#import FILE`, found `#include x`"
         );
+    }
+
+    #[test]
+    fn a_caller_s_function_keeps_its_own_lines_and_takes_the_place_of_the_look() {
+        let parts = Parts {
+            view_mode: ViewMode::Wire,
+            surface: Some(
+                "// mine\nfn surface_colour(point: SurfacePoint) -> vec4<f32> { return vec4(1.0); }",
+            ),
+        };
+        let own = compose("test.wgsl", "#import shared/ground.wgsl\n", &parts).unwrap();
+        let line = own.source.lines().position(|l| l == "// mine").unwrap() + 1;
+        assert_eq!(own.origin(line + 1), Some(("surface function", 2)));
+        assert_eq!(own.source.matches("fn surface_colour").count(), 1);
+        assert!(own.source.contains("return view_wire(point);"));
+        let look = compose("test.wgsl", "#import shared/ground.wgsl\n", &Parts::default()).unwrap();
+        assert!(look.source.contains("return view_shaded(point);") && look.source.contains("if TINT"));
     }
 }

@@ -1,40 +1,43 @@
-//! One view's state on the GPU: its levels' textures, constants and instances, and the one path that fills them.
+//! One view's state on the GPU, as the caller holds it: which update of which clipmap is there, and what may follow.
 
-use wgpu::util::DeviceExt as _;
-
-use crate::clipmap::{
-    Clipmap, HEIGHT_BYTES, Instance, LEVEL_SLOTS, LIGHT_BYTES, LevelConstants, VOID_HEIGHT, Window,
-};
-use crate::grid::Rect;
+use super::options::RendererOptions;
+use super::resident::{Resident, UploadReport};
+use super::staging::Staging;
+use crate::clipmap::{Clipmap, Ring};
+use crate::error::{Error, ErrorKind, Result};
 use crate::light::Sun;
 use crate::shade::ShadeConstants;
 
-/// What an upload wrote into textures.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct UploadReport {
-    /// Rectangles.
-    pub uploads: u64,
-    /// Their bytes.
-    pub bytes: u64,
+/// An update of a clipmap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Update {
+    clipmap: u64,
+    generation: u64,
+}
+
+impl Update {
+    fn of(clipmap: &Clipmap) -> Self {
+        Self {
+            clipmap: clipmap.identity(),
+            generation: clipmap.generation(),
+        }
+    }
+
+    fn follows(self, before: Self) -> bool {
+        self.clipmap == before.clipmap && self.generation == before.generation + 1
+    }
 }
 
 /// One view's state on the GPU. Made by [`super::ClipmapRenderer::textures`].
 #[derive(Debug)]
 pub struct ViewTextures {
-    device: wgpu::Device,
-    pub(super) heights: wgpu::Texture,
-    pub(super) light: wgpu::Texture,
-    held: wgpu::Texture,
-    view_constants: wgpu::Buffer,
-    level_constants: wgpu::Buffer,
-    shade_constants: wgpu::Buffer,
-    pub(super) bind_group: wgpu::BindGroup,
-    pub(super) instances: wgpu::Buffer,
-    generation: u64,
-    held_generations: Vec<Option<u64>>,
+    ring: Ring,
+    levels: u32,
+    resident: Resident,
+    staging: Staging,
+    /// The update that was recorded last; none where the textures' contents are unknown.
+    recorded: Option<Update>,
     sun: Sun,
-    staging: Vec<f32>,
-    instance_staging: Vec<Instance>,
 }
 
 impl ViewTextures {
@@ -44,286 +47,135 @@ impl ViewTextures {
         sampler: &wgpu::Sampler,
         clipmap: &Clipmap,
         sun: Sun,
-    ) -> Self {
-        let levels = clipmap.windows().len() as u32;
-        let ring = clipmap.ring();
-        let layers = |label, side: i64, format| {
-            device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d {
-                    width: side as u32,
-                    height: side as u32,
-                    depth_or_array_layers: levels,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING
-                    | wgpu::TextureUsages::COPY_DST
-                    | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            })
-        };
-        let heights = layers("clipscape heights", ring.clip_size, wgpu::TextureFormat::R32Float);
-        let held = layers(
-            "clipscape held corners",
-            ring.held_size(),
-            wgpu::TextureFormat::R32Float,
-        );
-        let light = layers(
-            "clipscape light",
-            ring.light_size(),
-            wgpu::TextureFormat::Rgba16Float,
-        );
-        let uniform = |label, size| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        };
-        let view_constants = uniform(
-            "clipscape view constants",
-            size_of_val(clipmap.view_constants()) as u64,
-        );
-        let level_constants = uniform(
-            "clipscape level constants",
-            (size_of::<LevelConstants>() * LEVEL_SLOTS) as u64,
-        );
-        let shade_constants = uniform("clipscape shade constants", size_of::<ShadeConstants>() as u64);
-        let array = |texture: &wgpu::Texture| {
-            texture.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2Array),
-                ..Default::default()
-            })
-        };
-        let views = [array(&heights), array(&held), array(&light)];
-        let resources = [
-            view_constants.as_entire_binding(),
-            level_constants.as_entire_binding(),
-            wgpu::BindingResource::TextureView(&views[0]),
-            wgpu::BindingResource::TextureView(&views[1]),
-            shade_constants.as_entire_binding(),
-            wgpu::BindingResource::TextureView(&views[2]),
-            wgpu::BindingResource::Sampler(sampler),
-        ];
-        let entries: Vec<_> = resources
-            .into_iter()
-            .zip(0..)
-            .map(|(resource, binding)| wgpu::BindGroupEntry { binding, resource })
-            .collect();
-        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("clipscape view"),
-            layout,
-            entries: &entries,
-        });
-        Self {
-            device: device.clone(),
-            heights,
-            light,
-            held,
-            view_constants,
-            level_constants,
-            shade_constants,
-            bind_group,
-            instances: instance_buffer(device, &[bytemuck::Zeroable::zeroed(); 1024]),
-            generation: 0,
-            held_generations: vec![None; levels as usize],
-            sun,
-            staging: Vec::new(),
-            instance_staging: Vec::new(),
+    ) -> Result<Self> {
+        let (ring, levels) = (*clipmap.ring(), clipmap.windows().len() as u32);
+        let limits = device.limits();
+        for (what, needed, provided) in [
+            (
+                "texels along a side of a texture",
+                ring.light_size() as u32,
+                limits.max_texture_dimension_2d,
+            ),
+            ("layers of a texture", levels, limits.max_texture_array_layers),
+        ] {
+            if needed > provided {
+                let what = format!("needs {needed} {what}, the device has {provided}");
+                return Err(Error::new(ErrorKind::Limit, "textures", what).advice("use a smaller clip size"));
+            }
         }
+        Ok(Self {
+            ring,
+            levels,
+            resident: Resident::new(device, layout, sampler, &ring, levels),
+            staging: Staging::new(device),
+            recorded: None,
+            sun,
+        })
     }
 
-    /// Sets the sun by which slopes are lit where no light was traced, and around which the sky glows.
+    /// Sets the sun by which slopes are lit where no light was traced, and around which the sky glows. It shines from the
+    /// next upload on.
     pub fn set_sun(&mut self, sun: Sun) {
         self.sun = sun;
     }
 
     /// The height texture: R32Float, clip size squared, a layer per level.
     pub fn heights(&self) -> &wgpu::Texture {
-        &self.heights
+        &self.resident.heights
     }
 
     /// The light texture: Rgba16Float, twice the clip size squared, a layer per level.
     pub fn light(&self) -> &wgpu::Texture {
-        &self.light
+        &self.resident.light
     }
 
     /// The constants, textures and sampler as a group for [`super::ClipmapRenderer::bind_group_layout`].
     pub fn bind_group(&self) -> &wgpu::BindGroup {
-        &self.bind_group
+        &self.resident.bind_group
     }
 
-    pub(super) fn upload(&mut self, queue: &wgpu::Queue, clipmap: &Clipmap) -> UploadReport {
-        let mut report = UploadReport::default();
-        if self.generation != clipmap.generation() {
-            let follows = self.generation + 1 == clipmap.generation();
-            for plan in clipmap.plan().levels() {
-                let window = &clipmap.windows()[plan.level as usize];
-                if follows {
-                    plan.heights
-                        .iter()
-                        .for_each(|&r| self.write_heights(queue, window, r, &mut report));
-                    plan.light
-                        .iter()
-                        .for_each(|&r| self.write_light(queue, window, r, &mut report));
-                } else {
-                    // An update was not uploaded, so what the GPU holds is unknown: whole windows.
-                    for rect in window.pieces(window.resident()) {
-                        self.write_heights(queue, window, rect, &mut report);
-                    }
-                    for rect in window.light_pieces(window.light_resident()) {
-                        self.write_light(queue, window, rect, &mut report);
-                    }
-                }
-            }
-            self.generation = clipmap.generation();
+    pub(super) fn instances(&self) -> &wgpu::Buffer {
+        &self.resident.instances
+    }
+
+    /// Records the clipmap's last update into `encoder`: what leads to it from the one before where that is here, else
+    /// whole windows.
+    pub(super) fn upload(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        clipmap: &Clipmap,
+        options: &RendererOptions,
+    ) -> Result<UploadReport> {
+        self.check(clipmap, options)?;
+        let now = Update::of(clipmap);
+        // Until all is recorded, what the textures will hold is unknown.
+        let before = self.recorded.take().filter(|_| !self.staging.was_dropped());
+        if before.is_none_or(|before| before.clipmap != now.clipmap) {
+            self.resident.forget();
         }
-        self.write_held(queue, clipmap);
-        queue.write_buffer(
-            &self.view_constants,
-            0,
-            bytemuck::bytes_of(clipmap.view_constants()),
-        );
-        queue.write_buffer(
-            &self.level_constants,
-            0,
-            bytemuck::cast_slice(clipmap.level_constants()),
-        );
-        let shade = self.shade_constants(clipmap);
-        queue.write_buffer(&self.shade_constants, 0, bytemuck::bytes_of(&shade));
-        self.write_instances(queue, clipmap);
-        report
-    }
-
-    /// The shading constants of a frame of `clipmap` under this view's sun.
-    pub fn shade_constants(&self, clipmap: &Clipmap) -> ShadeConstants {
-        ShadeConstants::new(
+        let shade = ShadeConstants::new(
             &self.sun,
             clipmap.height_range_m(),
             clipmap.grid().base_m,
             clipmap.vertical_scale(),
+        );
+        let mut upload = self.staging.begin(encoder);
+        let recorded = if before == Some(now) {
+            self.resident
+                .frame(&mut upload, clipmap, &shade)
+                .map(|()| UploadReport::default())
+        } else {
+            let follows = before.is_some_and(|before| now.follows(before));
+            self.resident.record(&mut upload, clipmap, &shade, follows)
+        };
+        upload.finish();
+        let report = recorded?;
+        self.recorded = Some(now);
+        Ok(report)
+    }
+
+    /// Refuses to draw what is not here: another clipmap, another of its updates, or one whose encoder was dropped.
+    pub(super) fn check_drawable(&self, clipmap: &Clipmap, options: &RendererOptions) -> Result<()> {
+        self.check(clipmap, options)?;
+        self.check_uploaded()?;
+        if self.recorded == Some(Update::of(clipmap)) {
+            return Ok(());
+        }
+        Err(Error::new(
+            ErrorKind::Misuse,
+            "textures",
+            "do not hold the clipmap's last update",
         )
+        .advice("upload it before drawing"))
     }
 
-    fn write_heights(&mut self, queue: &wgpu::Queue, window: &Window, rect: Rect, report: &mut UploadReport) {
-        let (n, [x, z]) = (self.heights.width() as usize, window.slot_of(rect.x0, rect.z0));
-        self.staging.clear();
-        for row in 0..rect.height() {
-            let first = (z + row) as usize * n + x as usize;
-            let heights = &window.heights()[first..first + rect.width() as usize];
-            self.staging
-                .extend(heights.iter().map(|h| if h.is_nan() { VOID_HEIGHT } else { *h }));
+    /// Refuses to draw where nothing was uploaded, or what was recorded will never be submitted.
+    pub(super) fn check_uploaded(&self) -> Result<()> {
+        if self.recorded.is_some() && !self.staging.was_dropped() {
+            return Ok(());
         }
-        let row_bytes = rect.width() as u32 * HEIGHT_BYTES as u32;
-        let bytes = bytemuck::cast_slice(&self.staging);
-        write(
-            queue,
-            &self.heights,
-            window.level(),
-            [x, z],
-            rect,
-            bytes,
-            row_bytes,
-        );
-        report.uploads += 1;
-        report.bytes += rect.area() as u64 * HEIGHT_BYTES;
+        Err(Error::new(ErrorKind::Misuse, "textures", "hold no update")
+            .advice("upload one before drawing, and submit the encoder that it was recorded into"))
     }
 
-    fn write_light(&mut self, queue: &wgpu::Queue, window: &Window, rect: Rect, report: &mut UploadReport) {
-        let (n, [x, z]) = (
-            self.light.width() as usize,
-            window.light_slot_of(rect.x0, rect.z0),
-        );
-        // The mirror has the texture's own layout: rows lie a whole row of slots apart.
-        let first = z as usize * n + x as usize;
-        let last = first + (rect.height() - 1) as usize * n + rect.width() as usize;
-        let bytes = bytemuck::cast_slice(&window.light()[first..last]);
-        write(
-            queue,
-            &self.light,
-            window.level(),
-            [x, z],
-            rect,
-            bytes,
-            n as u32 * LIGHT_BYTES as u32,
-        );
-        report.uploads += 1;
-        report.bytes += rect.area() as u64 * LIGHT_BYTES;
-    }
-
-    /// A level's grid of the held field is small; a change writes all of it.
-    fn write_held(&mut self, queue: &wgpu::Queue, clipmap: &Clipmap) {
-        let field = clipmap.held();
-        let grid = Rect::new(0, 0, field.size(), field.size());
-        for (level, held) in (0..).zip(&mut self.held_generations) {
-            if *held != Some(field.generation(level)) {
-                let bytes = bytemuck::cast_slice(field.grid(level));
-                let row_bytes = field.size() as u32 * size_of::<f32>() as u32;
-                write(queue, &self.held, level, [0, 0], grid, bytes, row_bytes);
-                *held = Some(field.generation(level));
-            }
+    /// Refuses a clipmap of other sizes or one that has seen nothing yet, and views that pipelines for `options` cannot
+    /// draw.
+    fn check(&self, clipmap: &Clipmap, options: &RendererOptions) -> Result<()> {
+        let (ring, levels) = (clipmap.ring(), clipmap.windows().len() as u32);
+        if (self.ring.clip_size, self.levels) != (ring.clip_size, levels) {
+            let what = format!(
+                "are made for {} levels of clip size {}, not for {levels} of {}",
+                self.levels, self.ring.clip_size, ring.clip_size
+            );
+            return Err(Error::new(ErrorKind::Misuse, "textures", what)
+                .advice("make textures for each clipmap from itself"));
         }
-    }
-
-    fn write_instances(&mut self, queue: &wgpu::Queue, clipmap: &Clipmap) {
-        let selection = clipmap.selection();
-        self.instance_staging.clear();
-        self.instance_staging.extend(selection.instances());
-        selection
-            .closers
-            .iter()
-            .for_each(|side| self.instance_staging.extend(side));
-        let bytes: &[u8] = bytemuck::cast_slice(&self.instance_staging);
-        if bytes.len() as u64 > self.instances.size() {
-            self.instances = instance_buffer(&self.device, &self.instance_staging);
-        } else if !bytes.is_empty() {
-            queue.write_buffer(&self.instances, 0, bytes);
+        if clipmap.generation() == 0 {
+            return Err(
+                Error::new(ErrorKind::Misuse, "clipmap", "has not been updated yet")
+                    .advice("update it before uploading"),
+            );
         }
+        options.check_view(clipmap)
     }
-}
-
-fn instance_buffer(device: &wgpu::Device, instances: &[Instance]) -> wgpu::Buffer {
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("clipscape instances"),
-        contents: bytemuck::cast_slice(instances),
-        usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
-    })
-}
-
-fn write(
-    queue: &wgpu::Queue,
-    texture: &wgpu::Texture,
-    layer: u32,
-    [x, z]: [i64; 2],
-    rect: Rect,
-    bytes: &[u8],
-    row_bytes: u32,
-) {
-    queue.write_texture(
-        wgpu::TexelCopyTextureInfo {
-            texture,
-            mip_level: 0,
-            origin: wgpu::Origin3d {
-                x: x as u32,
-                y: z as u32,
-                z: layer,
-            },
-            aspect: wgpu::TextureAspect::All,
-        },
-        bytes,
-        wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(row_bytes),
-            rows_per_image: None,
-        },
-        wgpu::Extent3d {
-            width: rect.width() as u32,
-            height: rect.height() as u32,
-            depth_or_array_layers: 1,
-        },
-    );
 }

@@ -6,8 +6,7 @@ use crate::camera::{View, check_picture};
 use crate::clipmap::{Clipmap, ClipmapOptions, UpdateReport};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu::{
-    ClipmapRenderer, DEPTH_FORMAT, DrawReport, Gpu, RendererOptions, SkyRenderer, UploadReport, ViewTextures,
-    read,
+    ClipmapRenderer, DrawReport, Gpu, RendererOptions, SkyRenderer, UploadReport, ViewTextures, read,
 };
 use crate::levels::Levels;
 use crate::light::Sun;
@@ -50,7 +49,7 @@ pub struct Frame {
     pub draw: DrawReport,
     /// Moving the windows (what is newly exposed is read) and selecting patches, in wall milliseconds.
     pub plan_ms: f64,
-    /// Handing the uploads to the device.
+    /// Writing the uploads into mapped memory and recording their copies, which are part of the draw.
     pub upload_ms: f64,
     /// Recording, submitting and waiting for the draw, without reading back.
     pub draw_ms: f64,
@@ -97,10 +96,6 @@ impl Headless {
     /// [`ErrorKind::Misuse`] for options out of range; those of `levels`.
     pub fn new(gpu: Gpu, levels: &dyn Levels, options: &HeadlessOptions) -> Result<Self> {
         check_picture(options.size_px)?;
-        if ![1, 4].contains(&options.sample_count) {
-            let what = format!("{} samples a pixel", options.sample_count);
-            return Err(Error::new(ErrorKind::Misuse, "multisampling", what).advice("use 1 or 4"));
-        }
         let clipmap = Clipmap::new(levels, &options.clipmap)?;
         let renderer_options = RendererOptions {
             colour_format: COLOUR_FORMAT,
@@ -109,12 +104,13 @@ impl Headless {
             traced_light: options.traced_light && clipmap.has_light(),
             tint: options.tint,
             haze: options.haze,
+            ..Default::default()
         };
-        let renderer = ClipmapRenderer::new(&gpu.device, &renderer_options);
-        let textures = renderer.textures(&gpu.device, &clipmap, options.sun);
+        let renderer = ClipmapRenderer::new(&gpu.device, &renderer_options)?;
+        let textures = renderer.textures(&gpu.device, &clipmap, options.sun)?;
         Ok(Self {
-            sky: SkyRenderer::new(&gpu.device, &renderer_options),
-            targets: Targets::new(&gpu.device, options),
+            sky: SkyRenderer::new(&gpu.device, &renderer_options)?,
+            targets: Targets::new(&gpu.device, options, &renderer_options),
             timer: gpu.has_timestamps().then(|| Timer::new(&gpu)),
             gpu,
             options: *options,
@@ -134,22 +130,17 @@ impl Headless {
         let view = View::new(*camera, self.options.size_px)?;
         let update = *self.clipmap.update(levels, &view, time_s)?;
         let planned = Instant::now();
-        let upload = self
-            .renderer
-            .upload(&self.gpu.queue, &self.clipmap, &mut self.textures);
-        self.sky.upload(
-            &self.gpu.queue,
-            &view,
-            &self.textures.shade_constants(&self.clipmap),
-        );
-        let uploaded = Instant::now();
         let mut encoder = self
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor {
                 label: Some("clipscape frame"),
             });
-        let draw = self.record(&mut encoder);
+        let upload = self
+            .renderer
+            .upload(&mut encoder, &self.clipmap, &mut self.textures)?;
+        let uploaded = Instant::now();
+        let draw = self.record(&mut encoder)?;
         self.gpu.queue.submit([encoder.finish()]);
         self.wait()?;
         let drawn = Instant::now();
@@ -169,7 +160,7 @@ impl Headless {
         })
     }
 
-    fn record(&self, encoder: &mut wgpu::CommandEncoder) -> DrawReport {
+    fn record(&self, encoder: &mut wgpu::CommandEncoder) -> Result<DrawReport> {
         let targets = &self.targets;
         let (view, resolve_target) = match &targets.multisampled {
             Some(view) => (view, Some(&targets.colour_view)),
@@ -189,7 +180,7 @@ impl Headless {
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &targets.depth_view,
                 depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
+                    load: wgpu::LoadOp::Clear(self.renderer.options().clear_depth()),
                     store: wgpu::StoreOp::Store,
                 }),
                 stencil_ops: None,
@@ -201,16 +192,16 @@ impl Headless {
             }),
             ..Default::default()
         });
-        let report = self.renderer.draw(&mut pass, &self.clipmap, &self.textures);
-        if self.options.view_mode == ViewMode::Shaded {
-            self.sky.draw(&mut pass);
+        let report = self.renderer.draw(&mut pass, &self.clipmap, &self.textures)?;
+        if matches!(self.options.view_mode, ViewMode::Shaded | ViewMode::Wire) {
+            self.sky.draw(&mut pass, &self.textures)?;
         }
         drop(pass);
         if let Some(timer) = &self.timer {
             encoder.resolve_query_set(&timer.queries, 0..2, &timer.resolved, 0);
             encoder.copy_buffer_to_buffer(&timer.resolved, 0, &timer.mappable, 0, 16);
         }
-        report
+        Ok(report)
     }
 
     fn wait(&self) -> Result<()> {
@@ -274,7 +265,7 @@ impl Headless {
 }
 
 impl Targets {
-    fn new(device: &wgpu::Device, options: &HeadlessOptions) -> Self {
+    fn new(device: &wgpu::Device, options: &HeadlessOptions, renderer: &RendererOptions) -> Self {
         let texture = |label, format, sample_count, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
@@ -299,7 +290,7 @@ impl Targets {
         } else {
             wgpu::TextureUsages::empty()
         };
-        let depth = texture("clipscape depth", DEPTH_FORMAT, samples, depth_usage);
+        let depth = texture("clipscape depth", renderer.depth_format, samples, depth_usage);
         let multisampled = (samples > 1).then(|| {
             texture(
                 "clipscape multisampled colour",

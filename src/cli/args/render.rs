@@ -110,7 +110,7 @@ pub(in crate::cli) struct ViewArgs {
     #[arg(long, value_name = "AZIMUTH,ALTITUDE", value_parser = values::sun, allow_hyphen_values = true)]
     pub(in crate::cli) sun: Option<Sun>,
 
-    /// What is shown: shaded, light, or level
+    /// What is shown: shaded, light, level, or wire
     #[arg(long, value_name = "VIEW", value_parser = view_values::view, default_value = "shaded")]
     pub(in crate::cli) view: ViewMode,
 
