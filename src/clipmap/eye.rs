@@ -1,5 +1,7 @@
 //! The eye as the clipmap knows it: an integer sample and a fraction, so that nothing on the GPU is absolute.
 
+use glam::DVec3;
+
 use crate::camera::Camera;
 use crate::grid::Grid;
 
@@ -23,6 +25,11 @@ pub struct Eye {
 impl Eye {
     /// The eye of `camera` over `grid`.
     pub fn new(camera: &Camera, grid: &Grid) -> Self {
+        Self::at(camera.eye, grid)
+    }
+
+    /// An eye at a place in the world, metres before vertical scale.
+    pub fn at(place: DVec3, grid: &Grid) -> Self {
         let axis = |metres: f64, spacing_m: f64, samples: i64| {
             let at = metres / spacing_m;
             let nearest = at.clamp(0.0, (samples - 1) as f64);
@@ -33,12 +40,12 @@ impl Eye {
             };
             (anchor as i64, at - anchor)
         };
-        let x = axis(camera.eye.x, grid.spacing_m[0], grid.size.width);
-        let z = axis(camera.eye.z, grid.spacing_m[1], grid.size.height);
+        let x = axis(place.x, grid.spacing_m[0], grid.size.width);
+        let z = axis(place.z, grid.spacing_m[1], grid.size.height);
         Self {
             anchor: [x.0, z.0],
             fraction: [x.1, z.1],
-            height_m: camera.eye.y - grid.base_m,
+            height_m: place.y - grid.base_m,
         }
     }
 
@@ -60,7 +67,6 @@ impl Eye {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
 
     fn eye(x: f64, z: f64) -> Eye {
         let camera = Camera {

@@ -6,6 +6,7 @@
 
 pub mod alpha;
 mod constants;
+mod drawn;
 mod eye;
 mod frustum;
 mod ground;
@@ -17,6 +18,7 @@ mod vertex;
 mod window;
 
 pub use constants::{LEVEL_SLOTS, LevelConstants, Ring, VOID_HEIGHT, ViewConstants, light_level, near_m};
+pub use drawn::{CORNERS, Corners, Drawn, Place};
 pub use eye::Eye;
 pub use frustum::Frustum;
 pub use held::HeldField;
@@ -113,6 +115,7 @@ pub struct Clipmap {
     held: HeldField,
     plan: UpdatePlan,
     generation: u64,
+    eye: Option<Eye>,
     view_constants: ViewConstants,
     level_constants: Vec<LevelConstants>,
     grounds: Vec<f64>,
@@ -152,6 +155,7 @@ impl Clipmap {
             held: HeldField::new(count, ring.held_size()),
             plan: UpdatePlan::new(count),
             generation: 0,
+            eye: None,
             view_constants: bytemuck::Zeroable::zeroed(),
             level_constants: Vec::with_capacity(count as usize),
             grounds: Vec::with_capacity(count as usize),
@@ -169,6 +173,7 @@ impl Clipmap {
     pub fn update(&mut self, levels: &dyn Levels, view: &View) -> Result<&UpdateReport> {
         view.camera.check()?;
         let eye = Eye::new(&view.camera, &self.grid);
+        self.eye = None; // until all is done, there is no frame
         self.generation += 1;
         self.plan.plan(&self.windows, &eye);
         let mut exposed = 0;
@@ -210,6 +215,7 @@ impl Clipmap {
             frustum: self.cull.then_some(&frustum),
             vertical_scale: self.vertical_scale,
         });
+        self.eye = Some(eye);
         self.report = UpdateReport {
             uploads: self.plan.uploads() as u64,
             upload_bytes: self.plan.bytes(),
@@ -286,6 +292,21 @@ impl Clipmap {
     /// The patches to draw.
     pub fn selection(&self) -> &Selection {
         &self.selection
+    }
+
+    /// The eye of the last update; none before the first, and after one that failed.
+    pub fn eye(&self) -> Option<&Eye> {
+        self.eye.as_ref()
+    }
+
+    /// What the GPU is told of a frame, to be broken on purpose by tests whose controls must catch it.
+    #[doc(hidden)]
+    pub fn frame_mut(&mut self) -> (&mut ViewConstants, &mut [LevelConstants], &mut Selection) {
+        (
+            &mut self.view_constants,
+            &mut self.level_constants,
+            &mut self.selection,
+        )
     }
 
     /// What the last update did.

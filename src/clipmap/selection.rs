@@ -192,7 +192,7 @@ pub struct Scene<'a> {
 impl Scene<'_> {
     /// The patches of the coarsest level: all of them, or those wholly in its window where finer levels are all that
     /// was asked for.
-    fn roots(&self) -> Rect {
+    pub(super) fn roots(&self) -> Rect {
         let window = &self.windows[self.windows.len() - 1];
         let level = self.grid.level(window.level());
         let resident = window.resident();
@@ -213,15 +213,15 @@ impl Scene<'_> {
         Rect::new(x0, z0, x1, z1)
     }
 
-    fn has_coarser(&self, level: u32) -> bool {
+    pub(super) fn has_coarser(&self, level: u32) -> bool {
         level as usize + 1 < self.windows.len()
     }
 
-    fn exists(&self, patch: Patch) -> bool {
+    pub(super) fn exists(&self, patch: Patch) -> bool {
         self.grid.patches(patch.level).rect().contains(patch.a, patch.b)
     }
 
-    fn info(&self, patch: Patch) -> Option<&PatchInfo> {
+    pub(super) fn info(&self, patch: Patch) -> Option<&PatchInfo> {
         self.windows[patch.level as usize].patch(patch.a, patch.b)
     }
 
@@ -260,7 +260,7 @@ impl Scene<'_> {
     }
 
     /// The least and greatest height of anything that may be drawn of a patch and all below it.
-    fn subtree_heights(&self, patch: Patch) -> [f32; 2] {
+    pub(super) fn subtree_heights(&self, patch: Patch) -> [f32; 2] {
         match self.info(patch) {
             // NaN: neither the patch nor anything handed up to it has a valid sample; drop nothing on that word.
             Some(info) if !info.bounds.need_min.is_nan() => [info.bounds.need_min, info.bounds.need_max],
@@ -291,7 +291,7 @@ impl Scene<'_> {
 }
 
 /// The least and greatest height of what is drawn between two levels' patches; NaN where both are void.
-fn hull(infos: [Option<&PatchInfo>; 2]) -> [f32; 2] {
+pub(super) fn hull(infos: [Option<&PatchInfo>; 2]) -> [f32; 2] {
     infos
         .into_iter()
         .flatten()
