@@ -12,8 +12,10 @@
 //! 7. The GPU holds copies of the windows ([`gpu::ViewTextures`]). A vertex is *displaced* in
 //!    `shaders/shared/surface.wgsl`, whose twin is [`clipmap::displace`], and slid towards the next coarser level by
 //!    [`clipmap::alpha`].
-//! 8. A fragment is *shaded* in `shaders/terrain.wgsl` with the constants of [`shade`].
-//! 9. [`render`] makes headless frames of it: pictures, contact sheets, animations, statistics.
+//! 8. The surface that a frame draws is [`clipmap::Drawn`]; heights, normals and rays are *queried* on it and on the
+//!    DEM's own surface alike: [`query::Surface`]. By it frames are *checked* for cracks: [`accuracy`].
+//! 9. A fragment is *shaded* in `shaders/terrain.wgsl` with the constants of [`shade`].
+//! 10. [`render`] makes headless frames of it: pictures, contact sheets, animations, statistics.
 //!
 //! Underneath all: [`grid`] is the only index arithmetic, [`error::Error`] the only error, [`camera`] says what is
 //! seen. Each room knows those above it in this file and none below.
@@ -48,7 +50,11 @@ pub mod stream;
 
 pub mod clipmap;
 
+pub mod query;
+
 pub mod shade;
+
+pub mod accuracy;
 
 #[cfg(feature = "gpu")]
 pub mod gpu;

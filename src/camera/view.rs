@@ -152,6 +152,16 @@ impl View {
         self.rays
     }
 
+    /// The ray from the eye through a place of the picture, in pixels east and south of its upper left corner: the
+    /// centre of the first pixel is at 0.5, 0.5. It is metres east, up and south of the eye as drawn, after vertical
+    /// scale, and one metre long along the view axis: a multiple of it is as far along the axis as it says.
+    pub fn ray(&self, pixel: [f64; 2]) -> DVec3 {
+        let [right, up, middle] = self.rays;
+        let x = 2.0 * pixel[0] / f64::from(self.size_px[0]) - 1.0;
+        let y = 1.0 - 2.0 * pixel[1] / f64::from(self.size_px[1]);
+        right * x + up * y + middle
+    }
+
     /// Its depth; none where that is the DEM's own, see [`View::new`].
     pub fn depth(&self) -> Option<Depth> {
         self.depth
@@ -270,6 +280,33 @@ mod tests {
         assert!(
             (x - 1.0).abs() < 1e-15 && (y - 1.0).abs() < 1e-15 && w == 1.0,
             "{x} {y} {w}"
+        );
+    }
+
+    #[test]
+    fn a_ray_projects_to_its_pixel() {
+        let camera = Camera {
+            eye: DVec3::new(5.0, -7.0, 1e6),
+            heading_deg: 123.0,
+            pitch_deg: -31.0,
+            roll_deg: 12.0,
+            fov_deg: 70.0,
+        };
+        let view = View::new(camera, [320, 200]).unwrap();
+        for pixel in [[0.0, 0.0], [320.0, 0.0], [160.0, 100.0], [17.5, 191.25]] {
+            let ray = view.ray(pixel);
+            let [x, y, w] = view.clip_rows().map(|row| row.dot(ray));
+            let back = [(x / w + 1.0) * 160.0, (1.0 - y / w) * 100.0];
+            assert!((w - 1.0).abs() < 1e-14);
+            assert!(
+                (0..2).all(|k| (back[k] - pixel[k]).abs() < 1e-11),
+                "{pixel:?}: {back:?}"
+            );
+        }
+        assert_eq!(
+            view.ray([160.0, 100.0]),
+            camera.axes().col(2),
+            "the axis is in the middle"
         );
     }
 

@@ -188,6 +188,11 @@ pub fn near_m(grid: &Grid) -> f64 {
     grid.spacing_m[0].min(grid.spacing_m[1]) / 1024.0
 }
 
+/// Nearest drawn distance of a view along its axis, in metres: its own, or the DEM's where it has none.
+pub fn near_of_m(view: &View, grid: &Grid) -> f64 {
+    view.depth().map_or(near_m(grid), |depth| depth.near_m())
+}
+
 impl LevelConstants {
     /// The constants of `level`; `climb_m` is the eye's height over the level's ground in metres.
     pub fn new(level: u32, coarser: bool, eye: &Eye, grid: &Grid, ring: &Ring, climb_m: f64) -> Self {

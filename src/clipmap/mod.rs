@@ -7,6 +7,7 @@
 pub mod alpha;
 mod arrivals;
 mod constants;
+mod drawn;
 mod eye;
 mod frustum;
 mod ground;
@@ -20,7 +21,10 @@ mod vertex;
 mod window;
 
 pub use arrivals::Wait;
-pub use constants::{LEVEL_SLOTS, LevelConstants, Ring, VOID_HEIGHT, ViewConstants, light_level, near_m};
+pub use constants::{
+    LEVEL_SLOTS, LevelConstants, Ring, VOID_HEIGHT, ViewConstants, light_level, near_m, near_of_m,
+};
+pub use drawn::{CORNERS, Corners, Drawn, Place};
 pub use eye::Eye;
 pub use frustum::Frustum;
 pub use held::{FADE_S, HeldField};
@@ -160,6 +164,7 @@ pub struct Clipmap {
     last_eye: Option<[f64; 2]>,
     plan: UpdatePlan,
     generation: u64,
+    eye: Option<Eye>,
     view_constants: ViewConstants,
     level_constants: Vec<LevelConstants>,
     grounds: Vec<f64>,
@@ -197,6 +202,7 @@ impl Clipmap {
             last_eye: None,
             plan: UpdatePlan::new(count),
             generation: 0,
+            eye: None,
             view_constants: bytemuck::Zeroable::zeroed(),
             level_constants: Vec::with_capacity(count as usize),
             grounds: Vec::with_capacity(count as usize),
@@ -226,6 +232,7 @@ impl Clipmap {
             ));
         }
         let eye = Eye::new(view.eye, &self.grid);
+        self.eye = None; // until all is done, there is no frame
         self.generation += 1;
         self.plan.begin(&self.windows, &eye);
         let mut exposed = 0;
@@ -265,6 +272,7 @@ impl Clipmap {
             frustum: self.cull.then_some(&frustum),
             vertical_scale: self.vertical_scale,
         });
+        self.eye = Some(eye);
         // A level that the camera's climb has dropped shows nothing, late or not.
         let shown = |level: usize| self.level_constants[level].climb < self.view_constants.reach;
         let shown = (0..self.windows.len() - 1).filter(|l| shown(*l));
@@ -387,6 +395,21 @@ impl Clipmap {
     /// The patches to draw.
     pub fn selection(&self) -> &Selection {
         &self.selection
+    }
+
+    /// The eye of the last update; none before the first, and after one that failed.
+    pub fn eye(&self) -> Option<&Eye> {
+        self.eye.as_ref()
+    }
+
+    /// What the GPU is told of a frame, to be broken on purpose by tests whose controls must catch it.
+    #[doc(hidden)]
+    pub fn frame_mut(&mut self) -> (&mut ViewConstants, &mut [LevelConstants], &mut Selection) {
+        (
+            &mut self.view_constants,
+            &mut self.level_constants,
+            &mut self.selection,
+        )
     }
 
     /// What the last update did.

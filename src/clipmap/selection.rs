@@ -107,7 +107,10 @@ impl Selection {
         near_to_far(&mut rows, roots.z0, roots.z1, z);
         for &b in &rows {
             for &a in &columns {
-                self.walk(scene, Patch::new(coarsest, a, b));
+                let root = Patch::new(coarsest, a, b);
+                if scene.has_arrived(root) {
+                    self.walk(scene, root);
+                }
             }
         }
         (self.columns, self.rows) = (columns, rows);
@@ -116,11 +119,6 @@ impl Selection {
     fn walk(&mut self, scene: &Scene<'_>, patch: Patch) {
         if !scene.exists(patch) {
             return;
-        }
-        if !scene.has_coarser(patch.level)
-            && !scene.windows[patch.level as usize].has_all_of(patch.a, patch.b)
-        {
-            return; // nothing is there that could be drawn instead
         }
         if !scene.refined(patch) {
             self.draw(scene, patch);
@@ -197,7 +195,7 @@ pub struct Scene<'a> {
 impl Scene<'_> {
     /// The patches of the coarsest level: all of them, or those wholly in its window where finer levels are all that
     /// was asked for.
-    fn roots(&self) -> Rect {
+    pub(super) fn roots(&self) -> Rect {
         let window = &self.windows[self.windows.len() - 1];
         let level = self.grid.level(window.level());
         let resident = window.resident();
@@ -218,15 +216,15 @@ impl Scene<'_> {
         Rect::new(x0, z0, x1, z1)
     }
 
-    fn has_coarser(&self, level: u32) -> bool {
+    pub(super) fn has_coarser(&self, level: u32) -> bool {
         level as usize + 1 < self.windows.len()
     }
 
-    fn exists(&self, patch: Patch) -> bool {
+    pub(super) fn exists(&self, patch: Patch) -> bool {
         self.grid.patches(patch.level).rect().contains(patch.a, patch.b)
     }
 
-    fn info(&self, patch: Patch) -> Option<&PatchInfo> {
+    pub(super) fn info(&self, patch: Patch) -> Option<&PatchInfo> {
         self.windows[patch.level as usize].patch(patch.a, patch.b)
     }
 
@@ -252,6 +250,11 @@ impl Scene<'_> {
         d < self.ring.reach() as f64 + MARGIN && self.held.least(finer, patch.a, patch.b) < 1.0
     }
 
+    /// Whether all of a patch of the coarsest level is there: else nothing could be drawn in its place.
+    pub(super) fn has_arrived(&self, root: Patch) -> bool {
+        self.windows[root.level as usize].has_all_of(root.a, root.b)
+    }
+
     fn borders_coarser(&self, patch: Patch, neighbour: Patch) -> bool {
         self.has_coarser(patch.level)
             && neighbour.parent() != patch.parent()
@@ -265,7 +268,7 @@ impl Scene<'_> {
     }
 
     /// The least and greatest height of anything that may be drawn of a patch and all below it.
-    fn subtree_heights(&self, patch: Patch) -> [f32; 2] {
+    pub(super) fn subtree_heights(&self, patch: Patch) -> [f32; 2] {
         match self.info(patch) {
             // NaN: neither the patch nor anything handed up to it has a valid sample; drop nothing on that word.
             Some(info) if !info.bounds.need_min.is_nan() => [info.bounds.need_min, info.bounds.need_max],
@@ -296,7 +299,7 @@ impl Scene<'_> {
 }
 
 /// The least and greatest height of what is drawn between two levels' patches; NaN where both are void.
-fn hull(infos: [Option<&PatchInfo>; 2]) -> [f32; 2] {
+pub(super) fn hull(infos: [Option<&PatchInfo>; 2]) -> [f32; 2] {
     infos
         .into_iter()
         .flatten()

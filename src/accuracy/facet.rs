@@ -1,0 +1,119 @@
+//! A triangle of the drawn surface as a plane on the screen, and what f32 and the rasteriser's grid do to its depths.
+//!
+//! Depth is near / w, w the distance along the view axis. Over a plane it is linear on the screen (1 / w is), so a
+//! facet is a depth and a gradient per pixel. What a device draws of it differs from that plane for three reasons.
+//!
+//! 1. *Vertices are rounded to f32.* A position from the eye takes the fraction's rounding, the difference, the
+//!    spacing's rounding and their product, a height two differences, the scale's rounding and a product; the clip
+//!    coefficients, their products and two sums follow: at most 8 roundings of 2^-24 of a term each, and by Cauchy and
+//!    Schwarz the terms of clip w add up to at most the vertex's distance r. [`ROUNDING`] is twice that, for what
+//!    follows from clipping at the near plane, which rounds its new vertices likewise. A point of a triangle moves no
+//!    farther than the worst of its corners: with r that of the farthest, w is off by `ROUNDING r`, the depth by
+//!    `depth ROUNDING r / w`, and the place on the screen by `ROUNDING (r / w) (f + size / 2)` pixels, f the focal
+//!    length in pixels. Adapters that contract products and sums may also move a morphing vertex by
+//!    `2^-23 (|h| + |c|)` upwards, see [`crate::clipmap::displace`]: both within the heights of the triangle, about.
+//! 2. *Vertices are snapped* to a grid of 1/256 pixel: by half a step along each axis, so the place on the screen is
+//!    off by at most [`RASTER_PX`].
+//! 3. *Depth is interpolated in f32*, from a corner of the triangle by its gradient: off by a few 2^-24 of the greatest
+//!    depth of what is seen of the triangle, which is at most 1, at the near plane.
+
+use glam::DVec3;
+
+use crate::camera::View;
+use crate::clipmap::{Eye, near_of_m};
+use crate::grid::Grid;
+use crate::query::{Crossing, Triangle};
+
+/// What a vertex's distance is multiplied by to bound its displacement by f32 arithmetic.
+pub const ROUNDING: f64 = 16.0 / (1u64 << 24) as f64;
+
+/// By how much the rasteriser's grid moves a place on the screen: half a step of 1/256 pixel along each axis.
+pub const RASTER_PX: f64 = 1.0 / 512.0;
+
+/// A triangle of the drawn surface as a plane on the screen.
+#[derive(Clone, Copy, Debug)]
+pub struct Facet {
+    /// Depth of its plane at the pixel.
+    pub depth: f64,
+    /// How it changes per pixel to the east and to the south.
+    pub gradient: [f64; 2],
+    /// How far a device's depth may be off at one place, whatever the gradient.
+    pub depth_rounding: f64,
+    /// By how many pixels a device's place on the screen may be off, along each axis.
+    pub place_rounding_px: f64,
+}
+
+impl Facet {
+    /// The triangle that a ray of `view` meets, at a place of the picture (which need not be the ray's own); none where
+    /// a corner of it is void, or its plane goes through the eye. Heights are multiplied by `vertical_scale`.
+    pub fn new(
+        grid: &Grid,
+        view: &View,
+        vertical_scale: f64,
+        crossing: &Crossing,
+        pixel: [f64; 2],
+    ) -> Option<Self> {
+        let eye = Eye::new(view.eye, grid);
+        let step = 1i64 << crossing.level;
+        let corner = |di: i64, dj: i64, height_m: f64| {
+            let ground = |axis: usize, index: i64| {
+                ((index * step - eye.anchor[axis]) as f64 - eye.fraction[axis]) * grid.spacing_m[axis]
+            };
+            let up = (height_m - eye.height_m) * vertical_scale;
+            DVec3::new(
+                ground(0, crossing.cell[0] + di),
+                up,
+                ground(1, crossing.cell[1] + dj),
+            )
+        };
+        let quad = &crossing.quad;
+        let third = match crossing.triangle {
+            Triangle::SouthWest => corner(0, 1, quad.sw),
+            Triangle::NorthEast => corner(1, 0, quad.ne),
+        };
+        let corners = [corner(0, 0, quad.nw), third, corner(1, 1, quad.se)];
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        // From the nearest corner, for the least rounding.
+        let nearest = corners
+            .into_iter()
+            .min_by(|a, b| a.length().total_cmp(&b.length()))?;
+        let distance = normal.dot(nearest);
+        if distance == 0.0 || !distance.is_finite() {
+            return None;
+        }
+        let near_m = near_of_m(view, grid);
+        let depth_along = |ray: DVec3| near_m * normal.dot(ray) / distance;
+        let ray = view.ray(pixel);
+        let east = view.ray([pixel[0] + 1.0, pixel[1]]) - ray;
+        let south = view.ray([pixel[0], pixel[1] + 1.0]) - ray;
+
+        let forward = view.clip_rows()[2];
+        let farthest_m = corners.iter().map(|p| p.length()).fold(0.0, f64::max);
+        let nearest_w = corners
+            .iter()
+            .map(|p| forward.dot(*p))
+            .fold(f64::INFINITY, f64::min);
+        let depth_most = (near_m / nearest_w.max(near_m)).min(1.0);
+        let w = crossing.along;
+        let height_most = [quad.nw, quad.se, quad.ne, quad.sw]
+            .into_iter()
+            .filter(|h| !h.is_nan())
+            .fold(0.0, |most: f64, h| most.max(h.abs()));
+        let moved_m = ROUNDING * farthest_m + height_most * vertical_scale.abs() / (1u64 << 22) as f64;
+        let half_px = view.size_px.map(|s| f64::from(s) / 2.0);
+        let [clip_x, clip_y, _] = view.clip_rows();
+        let focal_px = (clip_x.length() * half_px[0]).max(clip_y.length() * half_px[1]);
+        let half_size_px = half_px[0].max(half_px[1]);
+        Some(Self {
+            depth: depth_along(ray),
+            gradient: [depth_along(east), depth_along(south)],
+            depth_rounding: near_m / w * (moved_m / w) + ROUNDING * depth_most,
+            place_rounding_px: RASTER_PX + moved_m / w * (focal_px + half_size_px),
+        })
+    }
+
+    /// How far a device's depth may be off at the pixel.
+    pub fn rounding(&self) -> f64 {
+        self.depth_rounding + (self.gradient[0].abs() + self.gradient[1].abs()) * self.place_rounding_px
+    }
+}

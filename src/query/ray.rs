@@ -1,0 +1,364 @@
+//! The caster: where a ray first meets a surface.
+//!
+//! Along the ray's track over the ground, the tree of patches is walked from front to back. A patch is passed over
+//! where the ray stays above its greatest or below its least height; bounds that are not known pass over nothing. In a
+//! patch that is drawn, the quads along the track are walked, each cut at its diagonal. Over one triangle, surface less
+//! ray is linear in time: the ray meets it where that changes sign or is 0, from above or from below.
+//!
+//! *No slipping through.* The side on which the ray is, above or below, is carried from triangle to triangle. Where it
+//! is another at the start of one than at the end of the one before, the ray has met the surface at the edge between
+//! them, be it a step of rounding between levels or a wall. A hole ends what is carried. Of patches that were passed
+//! over the side is known but not whether the surface exists at their far end: where that matters, it is looked up.
+//!
+//! The ray starts at `start` (in multiples of its direction); a start on the surface is met at once. A ray that stands
+//! over one place has that place's height, and no step in time. Its cost is that of the patches along its track whose
+//! heights it crosses, and of their quads.
+//!
+//! *Rounding.* A time is one product of an exact distance and a rounded inverse, a height above the ray a sum of five
+//! products: both are off by a few 2^-53 of their terms.
+
+use glam::DVec3;
+
+use super::ground::{self, Track};
+use super::{Quad, Reader, Surface, Triangle};
+use crate::clipmap::{Eye, Place};
+use crate::error::{Error, ErrorKind, Result};
+use crate::grid::{Grid, PATCH, Patch, Rect};
+
+/// Where a ray meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// How far along the ray, as a multiple of its direction.
+    pub along: f64,
+    /// The surface's height there, metres above the DEM's base.
+    pub height_m: f64,
+    /// The level of the quad that it meets.
+    pub level: u32,
+    /// The quad's column and row, in samples of its level.
+    pub cell: [i64; 2],
+    /// Its heights.
+    pub quad: Quad,
+    /// Which of its triangles.
+    pub triangle: Triangle,
+    /// Whether it meets the edge between two triangles that do not agree there.
+    pub wall: bool,
+}
+
+/// A ray over the ground, in time: multiples of its direction.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line {
+    track: Track,
+    eye: Eye,
+    /// Metres up per unit of time, after vertical scale.
+    rise: f64,
+    scale: f64,
+    start: f64,
+    /// Units of time in the direction that was given.
+    factor: f64,
+}
+
+impl Line {
+    /// The ray from `eye` along `direction` (metres east, up and south, after vertical scale), from `start` on.
+    pub(super) fn new(grid: &Grid, eye: &Eye, direction: DVec3, scale: f64, start: f64) -> Result<Self> {
+        if !direction.is_finite() || direction == DVec3::ZERO {
+            let what = format!("a ray along {direction} leads nowhere");
+            return Err(Error::new(ErrorKind::Misuse, "query", what).advice("give a finite direction"));
+        }
+        // So that neither its parts nor their inverses leave f64's range.
+        let greatest = direction.abs().max_element();
+        let factor = if (1e-9..1e9).contains(&greatest) {
+            1.0
+        } else {
+            greatest
+        };
+        let direction = direction / factor;
+        Ok(Self {
+            track: Track {
+                x: ground::Axis::new(grid, eye, 0, direction.x),
+                z: ground::Axis::new(grid, eye, 1, direction.z),
+            },
+            eye: *eye,
+            rise: direction.y,
+            scale,
+            start: start * factor,
+            factor,
+        })
+    }
+
+    /// A time as a multiple of the direction that was given.
+    fn along(&self, time: f64) -> f64 {
+        time / self.factor
+    }
+
+    /// A height as metres above the eye, after vertical scale.
+    fn up(&self, height_m: f64) -> f64 {
+        if self.scale == 0.0 {
+            0.0
+        } else {
+            (height_m - self.eye.height_m) * self.scale
+        }
+    }
+
+    /// The side on which the ray stays of all that lies between two heights; none where it may meet it.
+    fn side_of(&self, heights: [f32; 2], span: [f64; 2]) -> Option<Side> {
+        let [a, b] = heights.map(|h| self.up(f64::from(h)));
+        let [c, d] = span.map(|t| self.rise * t);
+        // What is not known is NaN or infinite, and passes neither comparison.
+        if c.min(d) > a.max(b) && !a.is_nan() && !b.is_nan() {
+            Some(Side::Above)
+        } else if c.max(d) < a.min(b) && !a.is_nan() && !b.is_nan() {
+            Some(Side::Below)
+        } else {
+            None
+        }
+    }
+}
+
+/// The side of the surface on which a ray is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    Above,
+    Below,
+}
+
+impl Side {
+    fn of(surface_over_ray: f64) -> Option<Self> {
+        match surface_over_ray.partial_cmp(&0.0)? {
+            std::cmp::Ordering::Less => Some(Self::Above),
+            std::cmp::Ordering::Greater => Some(Self::Below),
+            std::cmp::Ordering::Equal => None,
+        }
+    }
+}
+
+/// What is carried from one patch or triangle to the next.
+#[derive(Clone, Copy, Debug)]
+enum Carried {
+    /// There was no surface, or the ray has only begun.
+    Nothing,
+    /// The ray was on this side.
+    Side(Side),
+    /// The ray was on this side of a patch that was passed over, if there is a surface at its end.
+    Passed(Side, Patch, [f64; 2]),
+}
+
+/// The part of a ray over one triangle.
+struct Piece {
+    cell: [i64; 2],
+    quad: Quad,
+    triangle: Triangle,
+    span: [f64; 2],
+    /// The surface's height at both ends; none of both where it is a hole.
+    heights: Option<[f64; 2]>,
+}
+
+struct Caster<'a> {
+    reader: &'a mut dyn Reader,
+    line: &'a Line,
+    carried: Carried,
+}
+
+/// The first crossing of a ray with a surface.
+///
+/// # Errors
+/// Those of the reader.
+pub(super) fn cast<S: Surface + ?Sized>(
+    surface: &S,
+    reader: &mut dyn Reader,
+    line: &Line,
+) -> Result<Option<Crossing>> {
+    if line.track.stands() {
+        return plumb(surface, reader, line);
+    }
+    let (level, roots) = surface.roots();
+    let step = PATCH << level;
+    let Some(span) = line.track.over(roots, step, [line.start, f64::INFINITY]) else {
+        return Ok(None);
+    };
+    let mut caster = Caster {
+        reader,
+        line,
+        carried: Carried::Nothing,
+    };
+    line.track.cells(roots, step, span, |a, b, span| {
+        caster.visit(Patch::new(level, a, b), span)
+    })
+}
+
+/// The crossing of a ray straight up or down.
+fn plumb<S: Surface + ?Sized>(surface: &S, reader: &mut dyn Reader, line: &Line) -> Result<Option<Crossing>> {
+    let found = ground::find(surface, reader, &line.eye)?;
+    Ok(found.and_then(|f| {
+        let height_m = f.quad.height(f.at)?;
+        let time = line.up(height_m) / line.rise;
+        (time >= line.start && time.is_finite()).then(|| Crossing {
+            along: line.along(time),
+            height_m,
+            level: f.level,
+            cell: f.cell,
+            quad: f.quad,
+            triangle: Triangle::holding(f.at),
+            wall: false,
+        })
+    }))
+}
+
+impl Caster<'_> {
+    fn visit(&mut self, patch: Patch, span: [f64; 2]) -> Result<Option<Crossing>> {
+        let place = self.reader.place(patch);
+        if place == Place::Nothing {
+            self.carried = Carried::Nothing;
+            return Ok(None);
+        }
+        if let Some(side) = self.line.side_of(self.reader.heights(patch)?, span) {
+            let before = match self.carried {
+                Carried::Nothing => side,
+                Carried::Side(before) | Carried::Passed(before, ..) => before,
+            };
+            // Else the ray changes sides where this patch begins, if there is a surface.
+            if before == side {
+                self.carried = Carried::Passed(side, patch, span);
+                return Ok(None);
+            }
+        }
+        if place == Place::Patch {
+            return self.meet(patch, span);
+        }
+        for child in self.line.track.children(patch) {
+            if let Some(span) = self.over(child, span)
+                && let Some(found) = self.visit(child, span)?
+            {
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
+    }
+
+    fn over(&self, patch: Patch, span: [f64; 2]) -> Option<[f64; 2]> {
+        let cell = Rect::new(patch.a, patch.b, patch.a + 1, patch.b + 1);
+        self.line.track.over(cell, PATCH << patch.level, span)
+    }
+
+    /// Walks the quads of a drawn patch.
+    fn meet(&mut self, patch: Patch, span: [f64; 2]) -> Result<Option<Crossing>> {
+        let line = self.line;
+        let mut carried = self.carried;
+        if let Carried::Passed(side, passed, span) = carried {
+            carried = if self.ends_on_surface(passed, span)? {
+                Carried::Side(side)
+            } else {
+                Carried::Nothing
+            };
+        }
+        let corners = self.reader.corners(patch)?;
+        let mut carried = match carried {
+            Carried::Side(side) => Some(side),
+            _ => None,
+        };
+        let found = pieces(line, corners, patch, span, |piece| {
+            let Some(heights) = piece.heights else {
+                carried = None;
+                return None;
+            };
+            let [first, last] = [0, 1].map(|k| line.up(heights[k]) - line.rise * piece.span[k]);
+            let wall = matches!((carried, Side::of(first)), (Some(a), Some(b)) if a != b);
+            let share = if wall || first == 0.0 {
+                0.0
+            } else if Side::of(first) != Side::of(last) {
+                first / (first - last)
+            } else {
+                carried = Side::of(last);
+                return None;
+            };
+            Some(Crossing {
+                along: line.along(piece.span[0] + (piece.span[1] - piece.span[0]) * share),
+                height_m: heights[0] + (heights[1] - heights[0]) * share,
+                level: patch.level,
+                cell: piece.cell,
+                quad: piece.quad,
+                triangle: piece.triangle,
+                wall,
+            })
+        });
+        self.carried = carried.map_or(Carried::Nothing, Carried::Side);
+        Ok(found)
+    }
+
+    /// Whether there is a surface at the end of a ray's span over a patch.
+    fn ends_on_surface(&mut self, patch: Patch, span: [f64; 2]) -> Result<bool> {
+        match self.reader.place(patch) {
+            Place::Nothing => Ok(false),
+            Place::Finer => {
+                let children = self.line.track.children(patch);
+                for child in children.into_iter().rev() {
+                    if let Some(part) = self.over(child, span)
+                        && part[1] == span[1]
+                    {
+                        return self.ends_on_surface(child, part);
+                    }
+                }
+                Ok(false)
+            }
+            Place::Patch => {
+                let line = self.line;
+                let mut exists = false;
+                pieces(line, self.reader.corners(patch)?, patch, span, |piece| {
+                    exists = piece.heights.is_some();
+                    None::<()>
+                });
+                Ok(exists)
+            }
+        }
+    }
+}
+
+/// The pieces of a ray over the triangles of a patch, one after another, until `visit` has found something.
+fn pieces<T>(
+    line: &Line,
+    corners: &crate::clipmap::Corners,
+    patch: Patch,
+    span: [f64; 2],
+    mut visit: impl FnMut(Piece) -> Option<T>,
+) -> Option<T> {
+    let (x0, z0) = (patch.a * PATCH, patch.b * PATCH);
+    let step = 1i64 << patch.level;
+    let cells = Rect::new(x0, z0, x0 + PATCH, z0 + PATCH);
+    let found: Result<Option<T>, std::convert::Infallible> =
+        line.track.cells(cells, step, span, |i, j, span| {
+            let quad = Quad::of(corners, (i - x0) as usize, (j - z0) as usize);
+            let [from, to] = span.map(|t| line.track.within(i, j, step, t));
+            let mut piece = |triangle, span: [f64; 2], from, to| {
+                let heights = quad.height_in(triangle, from).zip(quad.height_in(triangle, to));
+                visit(Piece {
+                    cell: [i, j],
+                    quad,
+                    triangle,
+                    span,
+                    heights: heights.map(|(a, b)| [a, b]),
+                })
+            };
+            // How far north-east of the diagonal.
+            let [a, b] = [from[0] - from[1], to[0] - to[1]];
+            if (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0) {
+                let share = a / (a - b);
+                let t = span[0] + (span[1] - span[0]) * share;
+                let on = from[0] + (to[0] - from[0]) * share;
+                let [first, second] = if a < 0.0 {
+                    [Triangle::SouthWest, Triangle::NorthEast]
+                } else {
+                    [Triangle::NorthEast, Triangle::SouthWest]
+                };
+                return Ok(piece(first, [span[0], t], from, [on, on])
+                    .or_else(|| piece(second, [t, span[1]], [on, on], to)));
+            }
+            let triangle = if a + b >= 0.0 {
+                Triangle::NorthEast
+            } else {
+                Triangle::SouthWest
+            };
+            Ok(piece(triangle, span, from, to))
+        });
+    match found {
+        Ok(found) => found,
+    }
+}
