@@ -1,0 +1,302 @@
+//! No cracks: over random cameras, no pixel sees through the drawn surface.
+//!
+//! Cameras: 30 % within 50 m of the ground, pitch from -90 to +10 degrees, all headings, over the DEM and a little off
+//! it, 128 x 128 pixels; clip sizes 64, 128 and 256, transition 0, 1, N/10 and its limit N/4 - 10. 50 of them by
+//! default; the long form is
+//!
+//! ```sh
+//! CLIPSCAPE_CAMERAS=2000 cargo test --test cracks -- --nocapture
+//! ```
+//!
+//! `CLIPSCAPE_SEED` sets the seed.
+#![cfg(feature = "gpu")]
+#![allow(clippy::print_stderr, reason = "long runs say what they saw")]
+
+mod support;
+
+use std::path::Path;
+
+use clipscape::accuracy::{DepthImage, cracks};
+use clipscape::build::Threads;
+use clipscape::camera::{Camera, View};
+use clipscape::clipmap::{Clipmap, ClipmapOptions, Drawn};
+use clipscape::gpu::{ClipmapRenderer, DEPTH_FORMAT, Gpu, RendererOptions};
+use clipscape::grid::Grid;
+use clipscape::levels::Levels;
+use clipscape::light::Sun;
+use clipscape::progress::Silent;
+use clipscape::pyramid::{Filter, Pyramid};
+use clipscape::query::{S0, Surface};
+use clipscape::shade::ViewMode;
+use clipscape::stream::Terrain;
+use glam::DVec3;
+use support::{Random, gpu, hash, seed};
+
+fn cameras() -> u32 {
+    std::env::var("CLIPSCAPE_CAMERAS")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(50)
+}
+
+/// White noise: each sample uniform in 0 to 9000 m; with voids, a tenth of it in blocks and some alone.
+fn white_noise(voids: bool) -> Pyramid {
+    let grid = Grid::new(1013, 1200, [30.0, 20.0]);
+    let heights = grid.size.rect().cells().map(|(i, j)| {
+        if voids && (hash(3, i / 13, j / 11) < 0.1 || hash(4, i, j) < 0.01) {
+            f32::NAN
+        } else {
+            (9000.0 * hash(0, i, j)) as f32
+        }
+    });
+    let threads = Threads::new(0).unwrap();
+    let mut pyramid = Pyramid::new(
+        grid,
+        heights.collect(),
+        None,
+        &Filter::default(),
+        &threads,
+        &Silent,
+    )
+    .unwrap();
+    pyramid.bound(&threads, &Silent).unwrap();
+    pyramid
+}
+
+fn camera(random: &mut Random, truth: &S0<'_>) -> Camera {
+    let grid = truth.grid();
+    let side = |axis: usize, samples: i64| grid.spacing_m[axis] * (samples - 1) as f64;
+    let x = random.uniform(-0.05, 1.05) * side(0, grid.size.width);
+    let z = random.uniform(-0.05, 1.05) * side(1, grid.size.height);
+    let ground = truth.height_at(x, z).unwrap().unwrap_or(0.0);
+    let above = if random.uniform(0.0, 1.0) < 0.3 {
+        random.uniform(-50.0, 50.0)
+    } else {
+        50.0 * random.uniform(0.0, 6.0).exp()
+    };
+    Camera {
+        eye: DVec3::new(x, ground + above, z),
+        heading_deg: random.uniform(0.0, 360.0),
+        pitch_deg: random.uniform(-90.0, 10.0),
+        roll_deg: random.uniform(-180.0, 180.0) * f64::from(u8::from(random.bits() % 4 == 0)),
+        fov_deg: random.uniform(20.0, 100.0),
+    }
+}
+
+fn options(random: &mut Random) -> ClipmapOptions {
+    let clip_size = random.pick(&[64, 128, 256]);
+    let limit = clip_size / 4 - 10;
+    ClipmapOptions {
+        clip_size,
+        transition: Some(random.pick(&[0, 1, clip_size / 10, limit]).min(limit)),
+        vertical_scale: random.pick(&[1.0, 1.0, 1.0, 0.0, -1.0, 3.0]),
+        ..Default::default()
+    }
+}
+
+/// Draws one clipmap after another into one picture's depth.
+struct Depths {
+    gpu: Gpu,
+    renderer: ClipmapRenderer,
+    colour: wgpu::Texture,
+    depth: wgpu::Texture,
+}
+
+impl Depths {
+    fn new(gpu: Gpu, size_px: [u32; 2]) -> Self {
+        let options = RendererOptions {
+            colour_format: wgpu::TextureFormat::Rgba8Unorm,
+            sample_count: 1,
+            view_mode: ViewMode::Level,
+            traced_light: false,
+            tint: false,
+            haze: false,
+        };
+        let texture = |format| {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("clipscape test target"),
+                size: wgpu::Extent3d {
+                    width: size_px[0],
+                    height: size_px[1],
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            })
+        };
+        Self {
+            renderer: ClipmapRenderer::new(&gpu.device, &options),
+            colour: texture(options.colour_format),
+            depth: texture(DEPTH_FORMAT),
+            gpu,
+        }
+    }
+
+    fn draw(&self, clipmap: &Clipmap) -> Vec<f32> {
+        let device = &self.gpu.device;
+        let mut textures = self.renderer.textures(device, clipmap, Sun::default());
+        self.renderer.upload(&self.gpu.queue, clipmap, &mut textures);
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("clipscape test pass"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.colour.create_view(&Default::default()),
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth.create_view(&Default::default()),
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        self.renderer.draw(&mut pass, clipmap, &textures);
+        drop(pass);
+        self.gpu.queue.submit([encoder.finish()]);
+        bytemuck::pod_collect_to_vec(&self.gpu.read_texture(&self.depth, 0).unwrap())
+    }
+}
+
+/// What is done to a frame before it is drawn and checked.
+type Breaking = fn(&mut Clipmap);
+
+/// What many cameras saw.
+#[derive(Debug, Default)]
+struct Seen {
+    cracks: usize,
+    cracked: Vec<String>,
+    pixels_of_terrain: usize,
+    frames_with_closers: u32,
+}
+
+fn look(levels: &dyn Levels, size_px: [u32; 2], cameras: u32, seed: u64, breaking: Breaking) -> Option<Seen> {
+    let depths = Depths::new(gpu()?, size_px);
+    let threads = Threads::new(0).unwrap();
+    let truth = S0::new(levels);
+    let mut random = Random(seed);
+    let mut seen = Seen::default();
+    for k in 0..cameras {
+        let options = options(&mut random);
+        let view = View::new(camera(&mut random, &truth), size_px).unwrap();
+        let mut clipmap = Clipmap::new(levels, &options).unwrap();
+        clipmap.update(levels, &view).unwrap();
+        breaking(&mut clipmap);
+        let image = depths.draw(&clipmap);
+        let drawn = Drawn::new(&clipmap).unwrap();
+        let found = cracks(&drawn, &DepthImage::new(&image, &view).unwrap(), &threads).unwrap();
+        seen.pixels_of_terrain += image.iter().filter(|d| **d > 0.0).count();
+        seen.frames_with_closers += u32::from(clipmap.selection().closers.iter().any(|c| !c.is_empty()));
+        for p in &found {
+            use clipscape::accuracy::Facet; use clipscape::query::Picker;
+            let centre = [f64::from(p[0]) + 0.5, f64::from(p[1]) + 0.5];
+            let d = f64::from(image[(p[1]*size_px[0]+p[0]) as usize]);
+            let near = clipscape::clipmap::near_m(drawn.clipmap().grid());
+            eprintln!("\ncamera {k} {p:?} drawn {d:e} w {} {options:?} eye {} ", near/d, view.camera.eye);
+            let mut picker = Picker::new(&drawn, &view).unwrap();
+            for r in [0.0, 1.0/512.0, 1.0/128.0] { for t in [0,2,4,6] {
+                if r == 0.0 && t > 0 { continue; }
+                let a = std::f64::consts::FRAC_PI_4 * t as f64;
+                let q = [centre[0] + r*a.cos(), centre[1]+ r*a.sin()];
+                let Some(h) = picker.cast(q).unwrap() else { eprintln!("  r {r} t {t} none"); continue };
+                let f = Facet::new(drawn.clipmap().grid(), &view, options.vertical_scale, &h, centre);
+                eprintln!("  r {r:.3} t {t} w {:.4} l{} {:?} {:?} {} pw {:.4?} g {:.4?} px {:.5?}", h.along, h.level, h.cell, h.triangle, h.wall, f.map(|f| near/f.depth), f.map(|f| f.gradient.map(|g| g/f.depth)), f.map(|f| f.place_rounding_px));
+            }}
+        }
+        seen.cracks += found.len();
+        if !found.is_empty() {
+            let first = &found[..found.len().min(3)];
+            seen.cracked.push(format!(
+                "camera {k}: {} cracks at {first:?}, {options:?} {:?}",
+                found.len(),
+                view.camera
+            ));
+        }
+    }
+    Some(seen)
+}
+
+fn expect_none(name: &str, levels: &dyn Levels, seed_default: u64) {
+    let (seed, count) = (seed(seed_default), cameras());
+    let started = std::time::Instant::now();
+    let Some(seen) = look(levels, [128, 128], count, seed, |_| {}) else {
+        return;
+    };
+    eprintln!(
+        "{name}: {count} cameras of seed {seed}: {} cracks in {} pixels of terrain, {:.1} s",
+        seen.cracks,
+        seen.pixels_of_terrain,
+        started.elapsed().as_secs_f64()
+    );
+    assert_eq!(seen.cracks, 0, "{name}, seed {seed}: {:#?}", seen.cracked);
+    assert!(
+        seen.pixels_of_terrain > count as usize * 2000,
+        "{name}, seed {seed}: {}",
+        seen.pixels_of_terrain
+    );
+}
+
+#[test]
+fn the_shipped_dem_has_no_cracks() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/N42E001.hgt");
+    expect_none("Pyrenees", &Terrain::open(path, &Silent).unwrap(), 31);
+}
+
+#[test]
+fn white_noise_has_no_cracks() {
+    expect_none("white noise", &white_noise(false), 32);
+}
+
+#[test]
+fn white_noise_with_voids_has_no_cracks() {
+    expect_none("white noise with voids", &white_noise(true), 33);
+}
+
+#[test]
+fn control_without_closing_triangles_cracks_are_found() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/N42E001.hgt");
+    let terrain = Terrain::open(path, &Silent).unwrap();
+    let open: Breaking = |clipmap| clipmap.frame_mut().2.closers.iter_mut().for_each(Vec::clear);
+    let seed = seed(34);
+    let Some(seen) = look(&terrain, [512, 512], 20, seed, open) else {
+        return;
+    };
+    eprintln!("without closing triangles: {} cracks", seen.cracks);
+    assert!(seen.cracks > 0, "seed {seed}: {seen:?}");
+}
+
+#[test]
+fn control_without_the_morph_cracks_are_found() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/N42E001.hgt");
+    let terrain = Terrain::open(path, &Silent).unwrap();
+    // No level knows of a coarser one: alpha is 0 everywhere, and levels meet as they are.
+    let rigid: Breaking = |clipmap| {
+        for level in clipmap.frame_mut().1 {
+            level.has_coarser = 0;
+        }
+    };
+    let seed = seed(35);
+    let Some(seen) = look(&terrain, [128, 128], 50, seed, rigid) else {
+        return;
+    };
+    eprintln!(
+        "without the morph: {} cracks in {} frames",
+        seen.cracks,
+        seen.cracked.len()
+    );
+    assert!(
+        seen.cracked.len() > 5 && seen.cracks > 50,
+        "seed {seed}: {seen:?}"
+    );
+}
