@@ -14,8 +14,15 @@
 //!    `2^-23 (|h| + |c|)` upwards, see [`crate::clipmap::displace`]: both within the heights of the triangle, about.
 //! 2. *Vertices are snapped* to a grid of 1/256 pixel: by half a step along each axis, so the place on the screen is
 //!    off by at most [`RASTER_PX`].
-//! 3. *Depth is interpolated in f32*, from a corner of the triangle by its gradient: off by a few 2^-24 of the greatest
-//!    depth of what is seen of the triangle, which is at most 1, at the near plane.
+//! 3. *Depth is interpolated in f32*, from a corner of the triangle by its gradient. The corner and the sum are off by
+//!    2^-24 of the greatest depth of what lies before the near plane. The gradient is a quotient of differences of
+//!    products: with L the triangle's extent on the screen, A its area and D its range of depths, each product is at
+//!    most D L and off by 2^-24 of it, as the corners' places are by 2^-24 of L and the picture's size S; over 2 A,
+//!    and along L, that is `2^-24 D L (L + S) / (2 A)`, a handful of times. For a sliver that is much; [`INTERPOLATION`]
+//!    is 16 times 2^-24. It never exceeds D, the depths at the corners being what they are.
+//!
+//! A rasteriser may take coverage from snapped corners and depth from the others: then what it draws at a pixel is the
+//! plane of a triangle that ends up to [`RASTER_PX`] beside it. So planes are compared at the pixel's centre.
 
 use glam::DVec3;
 
@@ -29,6 +36,9 @@ pub const ROUNDING: f64 = 16.0 / (1u64 << 24) as f64;
 
 /// By how much the rasteriser's grid moves a place on the screen: half a step of 1/256 pixel along each axis.
 pub const RASTER_PX: f64 = 1.0 / 512.0;
+
+/// What the extent of a triangle, in its own width, is multiplied by to bound the rounding of depths across it.
+pub const INTERPOLATION: f64 = 16.0 / (1u64 << 24) as f64;
 
 /// A triangle of the drawn surface as a plane on the screen.
 #[derive(Clone, Copy, Debug)]
@@ -87,13 +97,8 @@ impl Facet {
         let east = view.ray([pixel[0] + 1.0, pixel[1]]) - ray;
         let south = view.ray([pixel[0], pixel[1] + 1.0]) - ray;
 
-        let forward = view.clip_rows()[2];
         let farthest_m = corners.iter().map(|p| p.length()).fold(0.0, f64::max);
-        let nearest_w = corners
-            .iter()
-            .map(|p| forward.dot(*p))
-            .fold(f64::INFINITY, f64::min);
-        let depth_most = (near_m / nearest_w.max(near_m)).min(1.0);
+        let seen = Seen::new(view, near_m, corners);
         let w = crossing.along;
         let height_most = [quad.nw, quad.se, quad.ne, quad.sw]
             .into_iter()
@@ -107,7 +112,9 @@ impl Facet {
         Some(Self {
             depth: depth_along(ray),
             gradient: [depth_along(east), depth_along(south)],
-            depth_rounding: near_m / w * (moved_m / w) + ROUNDING * depth_most,
+            depth_rounding: near_m / w * (moved_m / w)
+                + ROUNDING * seen.depths[1]
+                + seen.interpolation(2.0 * half_size_px),
             place_rounding_px: RASTER_PX + moved_m / w * (focal_px + half_size_px),
         })
     }
@@ -115,5 +122,63 @@ impl Facet {
     /// How far a device's depth may be off at the pixel.
     pub fn rounding(&self) -> f64 {
         self.depth_rounding + (self.gradient[0].abs() + self.gradient[1].abs()) * self.place_rounding_px
+    }
+}
+
+/// What lies before the near plane of a triangle, on the screen.
+struct Seen {
+    /// Least and greatest depth.
+    depths: [f64; 2],
+    extent_px: f64,
+    area_px: f64,
+}
+
+impl Seen {
+    fn new(view: &View, near_m: f64, corners: [DVec3; 3]) -> Self {
+        let [x, y, w] = view.clip_rows();
+        let mut outline: Vec<DVec3> = Vec::with_capacity(4);
+        for (k, &from) in corners.iter().enumerate() {
+            let to = corners[(k + 1) % 3];
+            let [a, b] = [from, to].map(|p| w.dot(p) - near_m);
+            if a >= 0.0 {
+                outline.push(from);
+            }
+            if (a < 0.0) != (b < 0.0) {
+                outline.push(from + (to - from) * (a / (a - b)));
+            }
+        }
+        let size_px = view.size_px.map(f64::from);
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let mut places = Vec::with_capacity(4);
+        for &p in &outline {
+            let w = w.dot(p).max(near_m);
+            let place = [x.dot(p) / w * size_px[0] / 2.0, y.dot(p) / w * size_px[1] / 2.0];
+            for (k, value) in [place[0], place[1], near_m / w].into_iter().enumerate() {
+                low[k] = low[k].min(value);
+                high[k] = high[k].max(value);
+            }
+            places.push(place);
+        }
+        let cross = |k: usize| {
+            let (a, b): ([f64; 2], [f64; 2]) = (places[k], places[(k + 1) % places.len()]);
+            a[0] * b[1] - a[1] * b[0]
+        };
+        Self {
+            depths: [low[2], high[2]],
+            extent_px: (high[0] - low[0]).hypot(high[1] - low[1]),
+            area_px: (0..places.len()).map(cross).sum::<f64>().abs() / 2.0,
+        }
+    }
+
+    /// How far depths across it may be off, in a picture of `size_px`.
+    fn interpolation(&self, size_px: f64) -> f64 {
+        let range = self.depths[1] - self.depths[0];
+        let slenderness = self.extent_px * (self.extent_px + size_px) / (2.0 * self.area_px);
+        // Also where it has no area, or is nowhere before the near plane.
+        if slenderness * INTERPOLATION < 1.0 {
+            range * slenderness * INTERPOLATION
+        } else {
+            range
+        }
     }
 }

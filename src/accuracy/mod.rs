@@ -7,7 +7,7 @@ mod cracks;
 mod facet;
 
 pub use cracks::cracks;
-pub use facet::{Facet, RASTER_PX, ROUNDING};
+pub use facet::{Facet, INTERPOLATION, RASTER_PX, ROUNDING};
 
 use crate::camera::View;
 use crate::error::{Error, ErrorKind, Result};

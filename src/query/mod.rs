@@ -174,10 +174,29 @@ impl<'a, S: Surface + ?Sized> Picker<'a, S> {
     /// # Errors
     /// As for [`Surface::pick`].
     pub fn cast(&mut self, pixel: [f64; 2]) -> Result<Option<Crossing>> {
-        let scale = self.surface.vertical_scale();
-        let direction = self.view.ray(pixel);
-        let line = Line::new(self.surface.grid(), &self.eye, direction, scale, self.near_m)?;
+        let line = self.line(pixel)?;
         ray::cast(self.surface, self.reader.as_mut(), &line)
+    }
+
+    /// Where the ray through a place of the picture is behind the surface, between the near plane and `end_m`: on the
+    /// other side of it than before it first met it. Spans of metres along the view axis, one after another.
+    ///
+    /// # Errors
+    /// As for [`Surface::pick`].
+    pub fn behind(&mut self, pixel: [f64; 2], end_m: f64) -> Result<Vec<[f64; 2]>> {
+        let line = self.line(pixel)?;
+        ray::behind(self.surface, self.reader.as_mut(), &line, end_m)
+    }
+
+    fn line(&self, pixel: [f64; 2]) -> Result<Line> {
+        let scale = self.surface.vertical_scale();
+        Line::new(
+            self.surface.grid(),
+            &self.eye,
+            self.view.ray(pixel),
+            scale,
+            self.near_m,
+        )
     }
 }
 

@@ -156,6 +156,30 @@ struct Caster<'a> {
     reader: &'a mut dyn Reader,
     line: &'a Line,
     carried: Carried,
+    /// Where the ray is behind the surface; none to stop at the first crossing.
+    behind: Option<Behind>,
+}
+
+/// Where a ray is on the other side of the surface than it was before it first met it.
+#[derive(Debug, Default)]
+struct Behind {
+    home: Option<Side>,
+    since: Option<f64>,
+    spans: Vec<[f64; 2]>,
+}
+
+impl Behind {
+    fn side(&mut self, side: Option<Side>, time: f64) {
+        let behind = self.home.is_some() && side.is_some() && side != self.home;
+        match (self.since, behind) {
+            (None, true) => self.since = Some(time),
+            (Some(since), false) => {
+                self.spans.push([since, time]);
+                self.since = None;
+            }
+            _ => {}
+        }
+    }
 }
 
 /// The first crossing of a ray with a surface.
@@ -170,19 +194,43 @@ pub(super) fn cast<S: Surface + ?Sized>(
     if line.track.stands() {
         return plumb(surface, reader, line);
     }
-    let (level, roots) = surface.roots();
-    let step = PATCH << level;
-    let Some(span) = line.track.over(roots, step, [line.start, f64::INFINITY]) else {
-        return Ok(None);
-    };
     let mut caster = Caster {
         reader,
         line,
         carried: Carried::Nothing,
+        behind: None,
     };
-    line.track.cells(roots, step, span, |a, b, span| {
-        caster.visit(Patch::new(level, a, b), span)
-    })
+    caster.walk(surface, f64::INFINITY)
+}
+
+/// Where, up to `end`, a ray is behind the surface: on the other side of it than before it first met it. A hole ends
+/// it, unless it lies in a patch that the ray passes over. In multiples of the ray's direction, one span after another.
+///
+/// # Errors
+/// Those of the reader.
+pub(super) fn behind<S: Surface + ?Sized>(
+    surface: &S,
+    reader: &mut dyn Reader,
+    line: &Line,
+    end: f64,
+) -> Result<Vec<[f64; 2]>> {
+    if line.track.stands() {
+        let first = plumb(surface, reader, line)?
+            .map(|c| c.along)
+            .filter(|a| *a < end);
+        return Ok(first.map(|along| vec![[along, end]]).unwrap_or_default());
+    }
+    let mut caster = Caster {
+        reader,
+        line,
+        carried: Carried::Nothing,
+        behind: Some(Behind::default()),
+    };
+    caster.walk(surface, end * line.factor)?;
+    let behind = caster.behind.unwrap_or_default();
+    let last = behind.since.map(|since| [since, f64::INFINITY]);
+    let spans = behind.spans.into_iter().chain(last);
+    Ok(spans.map(|span| span.map(|t| line.along(t).min(end))).collect())
 }
 
 /// The crossing of a ray straight up or down.
@@ -204,10 +252,24 @@ fn plumb<S: Surface + ?Sized>(surface: &S, reader: &mut dyn Reader, line: &Line)
 }
 
 impl Caster<'_> {
+    fn walk<S: Surface + ?Sized>(&mut self, surface: &S, end: f64) -> Result<Option<Crossing>> {
+        let (level, roots) = surface.roots();
+        let (line, step) = (self.line, PATCH << level);
+        let Some(span) = line.track.over(roots, step, [line.start, end]) else {
+            return Ok(None);
+        };
+        line.track.cells(roots, step, span, |a, b, span| {
+            self.visit(Patch::new(level, a, b), span)
+        })
+    }
+
     fn visit(&mut self, patch: Patch, span: [f64; 2]) -> Result<Option<Crossing>> {
         let place = self.reader.place(patch);
         if place == Place::Nothing {
             self.carried = Carried::Nothing;
+            if let Some(behind) = &mut self.behind {
+                behind.side(None, span[0]);
+            }
             return Ok(None);
         }
         if let Some(side) = self.line.side_of(self.reader.heights(patch)?, span) {
@@ -255,19 +317,37 @@ impl Caster<'_> {
             Carried::Side(side) => Some(side),
             _ => None,
         };
+        let behind = &mut self.behind;
         let found = pieces(line, corners, patch, span, |piece| {
             let Some(heights) = piece.heights else {
                 carried = None;
+                if let Some(behind) = behind {
+                    behind.side(None, piece.span[0]);
+                }
                 return None;
             };
             let [first, last] = [0, 1].map(|k| line.up(heights[k]) - line.rise * piece.span[k]);
-            let wall = matches!((carried, Side::of(first)), (Some(a), Some(b)) if a != b);
+            let before = carried.or(Side::of(first));
+            carried = Side::of(last);
+            let wall = before != Side::of(first);
+            if let Some(behind) = behind {
+                if wall || carried != before {
+                    behind.home = behind.home.or(before);
+                }
+                behind.side(Side::of(first), piece.span[0]);
+                let share = if first == last {
+                    0.0
+                } else {
+                    (first / (first - last)).clamp(0.0, 1.0)
+                };
+                behind.side(carried, piece.span[0] + (piece.span[1] - piece.span[0]) * share);
+                return None;
+            }
             let share = if wall || first == 0.0 {
                 0.0
-            } else if Side::of(first) != Side::of(last) {
+            } else if carried != before {
                 first / (first - last)
             } else {
-                carried = Side::of(last);
                 return None;
             };
             Some(Crossing {
@@ -277,7 +357,7 @@ impl Caster<'_> {
                 cell: piece.cell,
                 quad: piece.quad,
                 triangle: piece.triangle,
-                wall,
+                wall: wall && first != 0.0,
             })
         });
         self.carried = carried.map_or(Carried::Nothing, Carried::Side);
