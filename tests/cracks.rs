@@ -79,7 +79,7 @@ fn camera(random: &mut Random, truth: &S0<'_>) -> Camera {
         eye: DVec3::new(x, ground + above, z),
         heading_deg: random.uniform(0.0, 360.0),
         pitch_deg: random.uniform(-90.0, 10.0),
-        roll_deg: random.uniform(-180.0, 180.0) * f64::from(u8::from(random.bits() % 4 == 0)),
+        roll_deg: random.uniform(-180.0, 180.0) * f64::from(u8::from(random.bits().is_multiple_of(4))),
         fov_deg: random.uniform(20.0, 100.0),
     }
 }

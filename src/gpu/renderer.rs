@@ -204,11 +204,12 @@ pub(super) fn created<T>(device: &wgpu::Device, label: &str, create: impl FnOnce
     let made = create();
     match pollster::block_on(scope.pop()) {
         None => Ok(made),
-        Some(error) => Err(Error::new(
-            ErrorKind::Misuse,
-            label,
-            format!("cannot be made ({error})"),
-        )),
+        Some(error) => {
+            let text = error.to_string();
+            let words: Vec<&str> = text.split_whitespace().collect();
+            let what = format!("cannot be made ({})", words.join(" "));
+            Err(Error::new(ErrorKind::Misuse, label, what))
+        }
     }
 }
 

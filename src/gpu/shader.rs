@@ -190,30 +190,62 @@ pub(super) fn module(device: &wgpu::Device, name: &str, parts: &Parts<'_>) -> Re
         return Ok(module);
     };
     let info = pollster::block_on(module.get_compilation_info());
-    Err(misfit(explain(&composed, &info, &error)))
+    Err(misfit(explain(&composed, parts, &info, &error)))
 }
 
-/// Where in the parts of a shader its compiler stumbled. A caller's function may be wrong only where it is called.
-fn explain(composed: &Composed, info: &wgpu::CompilationInfo, error: &wgpu::Error) -> ShaderError {
+/// Where in the parts of a shader its compiler stumbled. This crate's own parts compile by themselves, so wherever that is
+/// it is about the caller's function, if there is one: then, or where the compiler knows no place, its head is meant.
+fn explain(
+    composed: &Composed,
+    parts: &Parts<'_>,
+    info: &wgpu::CompilationInfo,
+    error: &wgpu::Error,
+) -> ShaderError {
     let first = info
         .messages
         .iter()
         .find(|m| m.message_type == wgpu::CompilationMessageType::Error);
     let place = first
         .and_then(|m| m.location)
-        .and_then(|l| composed.origin(l.line_number as usize));
-    let (file, line) = place.unwrap_or((SURFACE_FUNCTION, 1));
+        .and_then(|l| composed.origin(l.line_number as usize))
+        .filter(|(file, _)| parts.surface.is_none() || *file == SURFACE_FUNCTION);
+    let head = || {
+        let lines = parts.surface.unwrap_or_default().lines();
+        let head = lines.zip(1..).find(|(l, _)| l.contains("fn surface_colour"));
+        (SURFACE_FUNCTION, head.map_or(1, |(_, line)| line))
+    };
+    let (file, line) = place.unwrap_or_else(head);
     ShaderError {
         file: file.to_string(),
         line,
-        what: first.map_or_else(|| error.to_string(), |m| m.message.clone()),
+        what: summary(&first.map_or_else(|| error.to_string(), |m| m.message.clone())),
     }
+}
+
+/// A compiler's message in one line: what follows its first `error: `, and what it marks in the source that it quotes.
+fn summary(message: &str) -> String {
+    let first = message.lines().find(|l| !l.trim().is_empty()).unwrap_or_default();
+    let mut out = first
+        .split_once("error: ")
+        .map_or(first, |(_, what)| what)
+        .trim()
+        .to_string();
+    for line in message.lines() {
+        let mark = line.rsplit_once('^').map(|(_, mark)| mark.trim());
+        // Notes stand below, after an equals sign.
+        let note = line.trim_start().strip_prefix("= ");
+        if let Some(more) = mark.or(note).filter(|m| !m.is_empty() && !out.contains(m)) {
+            out.push_str(", ");
+            out.push_str(more);
+        }
+    }
+    out
 }
 
 fn misfit(error: ShaderError) -> Error {
     let subject = format!("{}:{}", error.file, error.line);
     Error::new(ErrorKind::Misuse, subject, &error.what)
-        .advice("it must define fn surface_colour(point: SurfacePoint) -> vec4<f32>")
+        .advice("RendererOptions::surface says what it must be")
         .because(error)
 }
 
@@ -255,6 +287,17 @@ mod tests {
             error.to_string(),
             "test.wgsl:1: expected `#import FILE`, found `#include x`"
         );
+    }
+
+    #[test]
+    fn a_message_is_cut_to_what_it_says() {
+        let message = "\nShader 'x' parsing error: no definition in scope for identifier: `a`\n  \u{250c}\u{2500} wgsl:3:1\n3 \u{2502} a\n  \u{2502} ^ unknown identifier\n  = note: spell it\n\n";
+        assert_eq!(
+            summary(message),
+            "no definition in scope for identifier: `a`, unknown identifier, note: spell it"
+        );
+        assert_eq!(summary("all is lost\n"), "all is lost");
+        assert_eq!(summary(""), "");
     }
 
     #[test]
