@@ -16,6 +16,15 @@ use glam::{DMat3, DVec3};
 
 use crate::error::{Error, ErrorKind, Result};
 
+/// The greatest coordinate of an eye in metres, either way.
+///
+/// On the GPU all numbers are f32, which ends at 3.4e38. A distance of 1e31 m stays within it in samples of a
+/// millimetre, and times what the narrowest field of view magnifies in the slimmest picture: 1e31 * 1.15e4 * 512.
+pub const MAX_EYE_M: f64 = 1e31;
+
+/// The narrowest field of view in degrees, see [`MAX_EYE_M`].
+pub const MIN_FOV_DEG: f64 = 0.01;
+
 /// A camera in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -27,12 +36,13 @@ pub struct Camera {
     pub pitch_deg: f64,
     /// Degrees by which the right side is tilted down.
     pub roll_deg: f64,
-    /// Vertical field of view in degrees, above 0 and below 180.
+    /// Vertical field of view in degrees, [`MIN_FOV_DEG`] or more and below 180.
     pub fov_deg: f64,
 }
 
 impl Camera {
-    /// Refuses positions and angles that are not finite, and fields of view that show nothing.
+    /// Refuses positions that are not finite or beyond [`MAX_EYE_M`], angles that are not finite, and fields of view
+    /// that show nothing.
     ///
     /// # Errors
     /// [`ErrorKind::Misuse`], naming the value.
@@ -40,6 +50,12 @@ impl Camera {
         let misuse = |what: String| Err(Error::new(ErrorKind::Misuse, "camera", what));
         if !self.eye.is_finite() {
             return misuse(format!("the eye at {} is not finite", self.eye));
+        }
+        if self.eye.abs().max_element() > MAX_EYE_M {
+            let [x, y, z] = self.eye.to_array();
+            return misuse(format!(
+                "the eye at {x:e}, {y:e}, {z:e} is farther than {MAX_EYE_M:e} m"
+            ));
         }
         for (name, angle) in [
             ("heading", self.heading_deg),
@@ -56,9 +72,9 @@ impl Camera {
                 self.pitch_deg
             ));
         }
-        if !(self.fov_deg > 0.0 && self.fov_deg < 180.0) {
+        if !(self.fov_deg >= MIN_FOV_DEG && self.fov_deg < 180.0) {
             return misuse(format!(
-                "a field of view of {} degrees is outside 0 to 180",
+                "a field of view of {} degrees is outside {MIN_FOV_DEG} to 180",
                 self.fov_deg
             ));
         }
@@ -190,6 +206,14 @@ mod tests {
                 ..good
             },
             Camera { fov_deg: 0.0, ..good },
+            Camera {
+                fov_deg: 1e-300,
+                ..good
+            },
+            Camera {
+                eye: DVec3::new(0.0, -1.01e31, 0.0),
+                ..good
+            },
         ] {
             assert_eq!(bad.check().unwrap_err().kind(), ErrorKind::Misuse);
         }

@@ -16,7 +16,9 @@ mod selection;
 mod vertex;
 mod window;
 
-pub use constants::{LEVEL_SLOTS, LevelConstants, Ring, VOID_HEIGHT, ViewConstants, light_level, near_m};
+pub use constants::{
+    LEVEL_SLOTS, LIGHT_TEXEL_STEPS, LevelConstants, Ring, VOID_HEIGHT, ViewConstants, light_level, near_m,
+};
 pub use eye::Eye;
 pub use frustum::Frustum;
 pub use held::HeldField;

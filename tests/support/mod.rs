@@ -8,6 +8,8 @@ use clipscape::grid::{Grid, Patch, Rect};
 use clipscape::levels::{Arrival, Bounds, Levels, LightSample};
 use half::f16;
 
+pub mod facts;
+
 /// Levels whose every sample is a function of level, column and row; NaN for no data.
 pub struct Formula<F> {
     pub grid: Grid,
