@@ -8,7 +8,7 @@ use std::fmt::Write;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::clipmap::{LEVEL_SLOTS, VOID_HEIGHT};
+use crate::clipmap::{LEVEL_SLOTS, LIGHT_TEXEL_STEPS, VOID_HEIGHT};
 use crate::grid::PATCH;
 use crate::light::Sun;
 
@@ -129,6 +129,7 @@ pub fn wgsl_constants() -> String {
     line("PATCH_CORNERS", format!("{}u", PATCH + 1));
     for (name, value) in [
         ("VOID_HEIGHT", VOID_HEIGHT),
+        ("LIGHT_TEXEL_STEPS", LIGHT_TEXEL_STEPS as f32),
         ("LIGHT_VIEW_SUN", LIGHT_VIEW[0]),
         ("LIGHT_VIEW_SKY", LIGHT_VIEW[1]),
         ("ROCK_UP", ROCK_UP),

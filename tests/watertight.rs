@@ -2,16 +2,17 @@
 
 mod support;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use clipscape::camera::{Camera, View};
-use clipscape::clipmap::{Clipmap, ClipmapOptions, Instance, Selection, Side, Vertex, displace};
-use clipscape::grid::{Grid, PATCH, Patch};
+use clipscape::clipmap::{Clipmap, ClipmapOptions, displace};
+use clipscape::grid::Grid;
 use clipscape::levels::Levels;
 use clipscape::progress::Silent;
 use clipscape::pyramid::{Filter, Pyramid};
 use clipscape::work::Serial;
 use glam::DVec3;
+use support::facts::{closer_faults, faults};
 use support::{Formula, Random, hash, hills, seed};
 
 type Hills = Formula<fn(u32, i64, i64) -> f32>;
@@ -56,134 +57,6 @@ fn scene(random: &mut Random) -> Scene {
         },
         view: View::new(camera, [64, 64]).unwrap(),
     }
-}
-
-/// A drawn patch's side: level, which end of the axis it faces, and its nine vertices by place along it.
-struct Line<'a> {
-    level: u32,
-    faces_on: bool,
-    instance: &'a Instance,
-    vertices: Vec<(i64, Vertex)>,
-}
-
-/// Checks the selection of `clipmap` against the alpha of `shader`, usually the same; says what is wrong.
-fn faults(clipmap: &Clipmap, shader: &Clipmap) -> Vec<String> {
-    let grid = clipmap.grid();
-    let mut faults = Vec::new();
-    let mut area = 0;
-    let mut lines: HashMap<(bool, i64), Vec<Line<'_>>> = HashMap::new();
-    for instance in clipmap.selection().instances() {
-        let step = 1i64 << instance.level;
-        let [x, z] = instance.origin.map(|o| i64::from(o) * step);
-        let side = PATCH * step;
-        let cut = |first: i64, samples: i64| ((first + side).min(samples - 1) - first).max(0);
-        area += cut(x, grid.size.width) * cut(z, grid.size.height);
-        for (along_x, far) in [(true, false), (true, true), (false, false), (false, true)] {
-            let at = if far { side } else { 0 };
-            let end = if far { PATCH as i32 } else { 0 };
-            let key = (along_x, if along_x { z + at } else { x + at });
-            let vertices = (0..=PATCH).map(|k| {
-                let (cx, cz) = if along_x { (k as i32, end) } else { (end, k as i32) };
-                // Vertices past a level's last sample fall on it.
-                let size = grid.level(instance.level);
-                let last = (if along_x { size.width } else { size.height } - 1) * step;
-                let place = (k * step + if along_x { x } else { z }).min(last);
-                (place, displace(shader, instance, cx, cz))
-            });
-            let line = Line {
-                level: instance.level,
-                faces_on: far,
-                instance,
-                vertices: vertices.collect(),
-            };
-            lines.entry(key).or_default().push(line);
-        }
-    }
-    let resident_whole = !clipmap.report().cut;
-    if resident_whole && area != (grid.size.width - 1) * (grid.size.height - 1) {
-        faults.push(format!("cover: {area} cells"));
-    }
-    for line in lines.values() {
-        for fine in line {
-            for coarse in line
-                .iter()
-                .filter(|c| c.faces_on != fine.faces_on && c.level >= fine.level)
-            {
-                let overlap = |a: &Line<'_>, b: &Line<'_>| a.vertices[0].0 < b.vertices[PATCH as usize].0;
-                if !overlap(fine, coarse) || !overlap(coarse, fine) {
-                    continue;
-                }
-                if coarse.level > fine.level + 1 {
-                    faults.push(format!("levels {} and {} meet", fine.level, coarse.level));
-                }
-                if coarse.level == fine.level + 1 && fine.vertices.iter().any(|(_, v)| v.alpha != 1.0) {
-                    faults.push(format!(
-                        "(b): {:?} meets a coarser patch with alpha below 1",
-                        fine.instance
-                    ));
-                }
-                for (place, theirs) in &coarse.vertices {
-                    let ours = fine.vertices.iter().find(|(p, _)| p == place).map(|(_, v)| v);
-                    if ours.is_some_and(|v| {
-                        (v.from_eye, v.height, v.clip) != (theirs.from_eye, theirs.height, theirs.clip)
-                    }) {
-                        faults.push(format!(
-                            "a vertex at {place} differs: {ours:?} {theirs:?} between {:?} and {:?}",
-                            fine.instance, coarse.instance
-                        ));
-                    }
-                }
-            }
-        }
-    }
-    faults.extend(closer_faults(clipmap.selection()));
-    // (c): wherever children are drawn, alpha of their parent's level is 0 on the parent.
-    for instance in clipmap.selection().instances() {
-        if instance.level as usize + 1 == clipmap.windows().len() {
-            continue;
-        }
-        let [a, b] = instance.origin.map(|o| i64::from(o) / PATCH);
-        let parent = Patch::new(instance.level, a, b).parent();
-        let origin = [(parent.a * PATCH) as i32, (parent.b * PATCH) as i32];
-        let parent = Instance {
-            origin,
-            level: parent.level,
-            fill: 0.0,
-        };
-        let zero = |k: i32| displace(shader, &parent, k % 9, k / 9).alpha == 0.0;
-        if !(0..81).all(zero) {
-            faults.push(format!("(c): {instance:?} is drawn where its parent morphs"));
-        }
-    }
-    faults
-}
-
-/// A side is closed exactly where a patch of the next coarser level is drawn beyond it.
-fn closer_faults(selection: &Selection) -> Vec<String> {
-    let drawn: HashSet<_> = selection
-        .instances()
-        .map(|i| (i.level, i.origin.map(|o| i64::from(o) / PATCH)))
-        .collect();
-    let mut faults = Vec::new();
-    for instance in selection.instances() {
-        let [a, b] = instance.origin.map(|o| i64::from(o) / PATCH);
-        for (side, closers) in Side::ALL.into_iter().zip(&selection.closers) {
-            let (a, b) = match side {
-                Side::West => (a - 1, b),
-                Side::East => (a + 1, b),
-                Side::North => (a, b - 1),
-                Side::South => (a, b + 1),
-            };
-            let beyond = Patch::new(instance.level, a, b).parent();
-            let coarser = drawn.contains(&(beyond.level, [beyond.a, beyond.b]));
-            if coarser != closers.contains(instance) {
-                faults.push(format!(
-                    "closer: {side:?} of {instance:?} beside a coarser patch: {coarser}"
-                ));
-            }
-        }
-    }
-    faults
 }
 
 #[test]

@@ -20,10 +20,12 @@ struct GroundPoint {
     level: u32,
 }
 
-// The light texel over a point, bilinear. Slots repeat, so the sampler's repetition is the torus.
+// The light texel over a point, bilinear. Slots repeat, so the sampler's repetition is the torus. The place from the eye
+// is taken in steps of a texel that add to a slot without rounding, so that it does not matter where the slots begin.
 fn light_at(level: u32, from_eye: vec2<f32>) -> vec4<f32> {
     let constants = levels[level];
-    let texel = constants.light_at_eye + from_eye * constants.light_scale + 0.5;
+    let place = round(from_eye * (constants.light_scale * LIGHT_TEXEL_STEPS)) * (1.0 / LIGHT_TEXEL_STEPS);
+    let texel = constants.light_at_eye + place + 0.5;
     return textureSampleLevel(light, light_sampler, texel * (0.5 / f32(view.slot_mask + 1)), level, 0.0);
 }
 

@@ -18,6 +18,15 @@ use glam::{DMat3, DVec3};
 
 use crate::error::{Error, ErrorKind, Result};
 
+/// The greatest coordinate of an eye in metres, either way.
+///
+/// On the GPU all numbers are f32, which ends at 3.4e38. A distance of 1e31 m stays within it in samples of a
+/// millimetre, and times what the narrowest field of view magnifies in the slimmest picture: 1e31 * 1.15e4 * 512.
+pub const MAX_EYE_M: f64 = 1e31;
+
+/// The narrowest field of view in degrees, see [`MAX_EYE_M`].
+pub const MIN_FOV_DEG: f64 = 0.01;
+
 /// A camera in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -29,20 +38,19 @@ pub struct Camera {
     pub pitch_deg: f64,
     /// Degrees by which the right side is tilted down.
     pub roll_deg: f64,
-    /// Vertical field of view in degrees, above 0 and below 180.
+    /// Vertical field of view in degrees, [`MIN_FOV_DEG`] or more and below 180.
     pub fov_deg: f64,
 }
 
 impl Camera {
-    /// Refuses positions and angles that are not finite, and fields of view that show nothing.
+    /// Refuses positions that are not finite or beyond [`MAX_EYE_M`], angles that are not finite, and fields of view
+    /// that show nothing.
     ///
     /// # Errors
     /// [`ErrorKind::Misuse`], naming the value.
     pub fn check(&self) -> Result<()> {
         let misuse = |what: String| Err(Error::new(ErrorKind::Misuse, "camera", what));
-        if !self.eye.is_finite() {
-            return misuse(format!("the eye at {} is not finite", self.eye));
-        }
+        check_eye(self.eye)?;
         for (name, angle) in [
             ("heading", self.heading_deg),
             ("pitch", self.pitch_deg),
@@ -58,9 +66,9 @@ impl Camera {
                 self.pitch_deg
             ));
         }
-        if !(self.fov_deg > 0.0 && self.fov_deg < 180.0) {
+        if !(self.fov_deg >= MIN_FOV_DEG && self.fov_deg < 180.0) {
             return misuse(format!(
-                "a field of view of {} degrees is outside 0 to 180",
+                "a field of view of {} degrees is outside {MIN_FOV_DEG} to 180",
                 self.fov_deg
             ));
         }
@@ -105,6 +113,21 @@ impl Camera {
         };
         (heading, d.y.atan2(level).to_degrees())
     }
+}
+
+/// Refuses an eye that is not finite or beyond [`MAX_EYE_M`].
+fn check_eye(eye: DVec3) -> Result<()> {
+    let misuse = |what: String| Err(Error::new(ErrorKind::Misuse, "camera", what));
+    if !eye.is_finite() {
+        return misuse(format!("the eye at {eye} is not finite"));
+    }
+    if eye.abs().max_element() > MAX_EYE_M {
+        let [x, y, z] = eye.to_array();
+        return misuse(format!(
+            "the eye at {x:e}, {y:e}, {z:e} is farther than {MAX_EYE_M:e} m"
+        ));
+    }
+    Ok(())
 }
 
 /// Sine and cosine of an angle in degrees, exact at multiples of 90.
@@ -192,6 +215,14 @@ mod tests {
                 ..good
             },
             Camera { fov_deg: 0.0, ..good },
+            Camera {
+                fov_deg: 1e-300,
+                ..good
+            },
+            Camera {
+                eye: DVec3::new(0.0, -1.01e31, 0.0),
+                ..good
+            },
         ] {
             assert_eq!(bad.check().unwrap_err().kind(), ErrorKind::Misuse);
         }

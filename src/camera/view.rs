@@ -6,7 +6,7 @@
 
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
-use super::{Camera, Depth, sin_cos_degrees};
+use super::{Camera, Depth, check_eye, sin_cos_degrees};
 use crate::error::{Error, ErrorKind, Result};
 
 /// The greatest width and height of a picture in pixels: WebGPU's default limit of a texture.
@@ -81,11 +81,12 @@ impl View {
     ///
     /// # Errors
     /// [`ErrorKind::Misuse`] for matrices that are not finite, a view that scales, shears or mirrors, a projection that is
-    /// orthographic, left-handed, mirrored or singular or that has an oblique near plane, and a picture of no or too many
-    /// pixels.
+    /// orthographic, left-handed, mirrored or singular or that has an oblique near plane, an eye too far away, and a
+    /// picture of no or too many pixels.
     pub fn from_matrices(view: DMat4, projection: DMat4, size_px: [u32; 2]) -> Result<Self> {
         check_picture(size_px)?;
         let (rotation, eye) = rigid(view)?;
+        check_eye(eye)?;
         let ([xx, xy, xz], [yx, yy, yz], depth) = perspective(projection)?;
         // Rows of the rotation are the eye's axes in the world: right, up, backward.
         let [right, up, backward] = [0, 1, 2].map(|k| rotation.row(k));
@@ -127,15 +128,12 @@ impl View {
         self
     }
 
-    /// Refuses an eye that is not finite and a picture of no or too many pixels: both may have been set since.
+    /// Refuses an eye that is not finite or too far away and a picture of no or too many pixels: both may have been set since.
     ///
     /// # Errors
     /// [`ErrorKind::Misuse`], naming the value.
     pub fn check(&self) -> Result<()> {
-        if !self.eye.is_finite() {
-            let what = format!("the eye at {} is not finite", self.eye);
-            return Err(Error::new(ErrorKind::Misuse, "view", what));
-        }
+        check_eye(self.eye)?;
         check_picture(self.size_px)
     }
 

@@ -16,6 +16,10 @@ pub const VOID_HEIGHT: f32 = f32::MIN;
 /// One past the greatest level index that the shader's array of [`LevelConstants`] holds.
 pub const LEVEL_SLOTS: usize = MAX_LEVELS as usize;
 
+/// Steps into which a light texel is divided where light is looked up. With up to 2^12 texels along a side, twice that
+/// between a texel's slot and its place from the eye, f32 holds such places exactly, whatever their slots.
+pub const LIGHT_TEXEL_STEPS: f64 = 1024.0;
+
 /// Constants of a frame.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
@@ -202,12 +206,14 @@ impl LevelConstants {
         let mean_spacing_m = (grid.spacing_m[0] * grid.spacing_m[1]).sqrt();
         let light_step = (1i64 << light_level(level)) as f64;
         let light_size = ring.light_size();
-        // Light texels of the anchor and the fraction apart, so that a large index costs the fraction nothing.
+        // Light texels of the anchor and the fraction apart, so that a large index costs the fraction nothing. The
+        // fraction is taken in steps that f32 holds beside any slot: where the slots begin must not change a bit.
         let light_at_eye = |axis: usize| {
             let shift = grid.offset[axis] >> light_level(level);
             let whole = eye.anchor[axis] >> light_level(level);
             let rest = (eye.anchor[axis] - (whole << light_level(level))) as f64 + eye.fraction[axis];
-            (slot(whole + shift, light_size) as f64 + rest / light_step) as f32
+            let rest = (rest / light_step * LIGHT_TEXEL_STEPS).round() / LIGHT_TEXEL_STEPS;
+            (slot(whole + shift, light_size) as f64 + rest) as f32
         };
         Self {
             last: [size.width as i32 - 1, size.height as i32 - 1],

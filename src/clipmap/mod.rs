@@ -22,7 +22,8 @@ mod window;
 
 pub use arrivals::Wait;
 pub use constants::{
-    LEVEL_SLOTS, LevelConstants, Ring, VOID_HEIGHT, ViewConstants, light_level, near_m, near_of_m,
+    LEVEL_SLOTS, LIGHT_TEXEL_STEPS, LevelConstants, Ring, VOID_HEIGHT, ViewConstants, light_level, near_m,
+    near_of_m,
 };
 pub use drawn::{CORNERS, Corners, Drawn, Place};
 pub use eye::Eye;

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use clipscape::clipmap::{Clipmap, Instance, Selection, Side, Vertex, displace};
-use clipscape::grid::{PATCH, Patch};
+use clipscape::grid::{MAX_LEVELS, PATCH, Patch};
 
 /// A drawn patch's side: level, which end of the axis it faces, and its nine vertices by place along it.
 struct Line<'a> {
@@ -140,12 +140,11 @@ fn cover_faults(clipmap: &Clipmap, faults: &mut Vec<String>) {
 
 /// All patches that hold one of `drawn`.
 fn above(drawn: &[Patch]) -> HashSet<Patch> {
-    let coarsest = drawn.iter().map(|p| p.level).max().unwrap_or(0);
     let mut above = HashSet::new();
-    for mut patch in drawn.iter().copied() {
-        while patch.level < coarsest {
-            patch = patch.parent();
-            above.insert(patch);
+    for patch in drawn {
+        let mut parent = patch.parent();
+        while parent.level < MAX_LEVELS && above.insert(parent) {
+            parent = parent.parent();
         }
     }
     above

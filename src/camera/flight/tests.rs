@@ -82,7 +82,7 @@ fn what_is_wrong_is_named_in_one_line() {
         ),
         (
             r#"{"keys": [{"t": 0, "eye": [1e300, 0, 0], "heading": 0, "pitch": 0}]}"#.into(),
-            "1e100",
+            "farther than 1e31 m",
         ),
     ] {
         let error = Flight::parse("f.json", &json).unwrap_err();

@@ -1,0 +1,152 @@
+//! Small frames and what is read back of them.
+
+use clipscape::camera::Camera;
+use clipscape::clipmap::ClipmapOptions;
+use clipscape::gpu::{ClipmapRenderer, Gpu, RendererOptions, ViewTextures};
+use clipscape::levels::Levels;
+use clipscape::light::Sun;
+use clipscape::render::{Headless, HeadlessOptions};
+use clipscape::shade::ViewMode;
+use half::f16;
+
+/// Shaded, with all that shading does; clip size 64.
+pub(crate) fn options(size_px: [u32; 2]) -> HeadlessOptions {
+    HeadlessOptions {
+        size_px,
+        sample_count: 1,
+        view_mode: ViewMode::Shaded,
+        tint: true,
+        haze: true,
+        traced_light: true,
+        sun: Sun::default(),
+        clipmap: ClipmapOptions {
+            clip_size: 64,
+            ..Default::default()
+        },
+    }
+}
+
+pub(crate) fn headless(gpu: &Gpu, levels: &dyn Levels, options: &HeadlessOptions) -> Headless {
+    Headless::new(gpu.clone(), levels, options).unwrap()
+}
+
+/// A frame read back.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Picture {
+    pub(crate) rgba8: Vec<u8>,
+    pub(crate) depth: Vec<f32>,
+}
+
+impl Picture {
+    /// Pixels of which colour or depth differ in any bit.
+    pub(crate) fn differing(&self, other: &Self) -> usize {
+        let pixels = self.depth.len();
+        assert_eq!(pixels, other.depth.len());
+        let bits = |picture: &Self, k: usize| {
+            (
+                picture.rgba8[4 * k..4 * k + 4].to_vec(),
+                picture.depth[k].to_bits(),
+            )
+        };
+        (0..pixels).filter(|&k| bits(self, k) != bits(other, k)).count()
+    }
+
+    pub(crate) fn terrain_pixels(&self) -> usize {
+        self.depth.iter().filter(|d| **d != 0.0).count()
+    }
+}
+
+pub(crate) fn frame(headless: &mut Headless, levels: &dyn Levels, camera: &Camera) -> Picture {
+    let rgba8 = headless.frame(levels, camera, 0.0).unwrap().rgba8;
+    let depth = headless.read_depth().unwrap();
+    Picture { rgba8, depth }
+}
+
+/// Draws what a [`Headless`] drew last into a target of floats, in which colours that are no number can be seen.
+pub(crate) struct Floats {
+    renderer: ClipmapRenderer,
+    textures: ViewTextures,
+    colour: wgpu::Texture,
+    depth: wgpu::TextureView,
+    /// Red of the pixels that show no terrain.
+    pub(crate) background: f64,
+}
+
+impl Floats {
+    pub(crate) fn new(headless: &Headless, size_px: [u32; 2]) -> Self {
+        let device = &headless.gpu().device;
+        let target = |format| {
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: None,
+                size: wgpu::Extent3d {
+                    width: size_px[0],
+                    height: size_px[1],
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            })
+        };
+        let options = RendererOptions {
+            colour_format: wgpu::TextureFormat::Rgba16Float,
+            traced_light: headless.clipmap().has_light(),
+            ..Default::default()
+        };
+        let renderer = ClipmapRenderer::new(device, &options).unwrap();
+        Self {
+            textures: renderer
+                .textures(device, headless.clipmap(), Sun::default())
+                .unwrap(),
+            renderer,
+            colour: target(wgpu::TextureFormat::Rgba16Float),
+            depth: target(options.depth_format).create_view(&Default::default()),
+            background: 0.0,
+        }
+    }
+
+    /// Pixels with a channel outside 0 to 1, or that is no number.
+    pub(crate) fn unfit_pixels(&mut self, headless: &Headless) -> usize {
+        let gpu = headless.gpu();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        self.renderer
+            .upload(&mut encoder, headless.clipmap(), &mut self.textures)
+            .unwrap();
+        let view = self.colour.create_view(&Default::default());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color {
+                        r: self.background,
+                        ..wgpu::Color::BLACK
+                    }),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        self.renderer
+            .draw(&mut pass, headless.clipmap(), &self.textures)
+            .unwrap();
+        drop(pass);
+        gpu.queue.submit([encoder.finish()]);
+        let bytes = gpu.read_texture(&self.colour, 0).unwrap();
+        let texels: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        let fit = |channel: &u16| (0.0..=1.0).contains(&f16::from_bits(*channel).to_f32());
+        texels.iter().filter(|texel| !texel.iter().all(fit)).count()
+    }
+}
