@@ -12,7 +12,8 @@
 //! 7. The GPU holds copies of the windows ([`gpu::ViewTextures`]). A vertex is *displaced* in
 //!    `shaders/shared/surface.wgsl`, whose twin is [`clipmap::displace`], and slid towards the next coarser level by
 //!    [`clipmap::alpha`].
-//! 8. A fragment is *shaded* in `shaders/terrain.wgsl` with the constants of [`shade`].
+//! 8. A fragment is *shaded* in `shaders/shared/ground.wgsl`, by the view's function or the caller's own, with the
+//!    constants of [`shade`].
 //! 9. [`render`] makes headless frames of it: pictures, contact sheets, animations, statistics.
 //!
 //! Underneath all: [`grid`] is the only index arithmetic, [`error::Error`] the only error, [`camera`] says what is
