@@ -14,7 +14,8 @@
 //!    [`clipmap::alpha`].
 //! 8. The surface that a frame draws is [`clipmap::Drawn`]; heights, normals and rays are *queried* on it and on the
 //!    DEM's own surface alike: [`query::Surface`]. By it frames are *checked* for cracks: [`accuracy`].
-//! 9. A fragment is *shaded* in `shaders/terrain.wgsl` with the constants of [`shade`].
+//! 9. A fragment is *shaded* in `shaders/shared/ground.wgsl`, by the view's function or the caller's own, with the
+//!    constants of [`shade`].
 //! 10. [`render`] makes headless frames of it: pictures, contact sheets, animations, statistics.
 //!
 //! Underneath all: [`grid`] is the only index arithmetic, [`error::Error`] the only error, [`camera`] says what is

@@ -20,7 +20,7 @@ pub enum ViewMode {
     Shaded,
     /// The bare light, grey.
     Light,
-    /// A colour per level: whiter where the ring slides it into the next one, darker where it is held.
+    /// A colour per level: whiter where the ring slides it into the next one, hatched where it is held.
     Level,
     /// The edges of the triangles that are drawn, over the ground.
     Wire,

@@ -182,6 +182,19 @@ fn the_bare_light_at_four_samples_a_pixel() {
 }
 
 #[test]
+fn levels_and_the_bands_between_them() {
+    let mut options = HeadlessOptions {
+        view_mode: ViewMode::Level,
+        ..options()
+    };
+    options.clipmap.clip_size = 64;
+    let Some(pixels) = draw(&options, &near()) else {
+        return;
+    };
+    compare("level", &pixels);
+}
+
+#[test]
 fn light_from_slopes_where_none_was_traced() {
     let sun = Sun {
         azimuth_deg: 90.0,

@@ -3,7 +3,7 @@
 
 mod support;
 
-use clipscape::camera::{Camera, View};
+use clipscape::camera::{Camera, Depth, DepthDirection, View};
 use clipscape::clipmap::{Clipmap, ClipmapOptions, VOID_HEIGHT, Vertex, displace, light_level};
 use clipscape::gpu::{Parts, compose, read};
 use clipscape::grid::{Grid, PATCH};
@@ -12,6 +12,8 @@ use clipscape::light::Sun;
 use clipscape::render::{Headless, HeadlessOptions};
 use clipscape::shade::ViewMode;
 use glam::DVec3;
+use glam::dcamera::rh::proj::directx;
+use glam::dcamera::rh::view::look_to_mat4;
 use support::{Formula, Random, gpu, hash, hills, seed};
 use wgpu::util::DeviceExt as _;
 
@@ -41,6 +43,19 @@ fn camera(random: &mut Random, grid: &Grid) -> Camera {
         roll_deg: random.uniform(-20.0, 20.0),
         fov_deg: random.uniform(20.0, 90.0),
     }
+}
+
+/// A view by matrices: a part beside the middle of what the camera sees, reversed depth with an end.
+fn off_axis(camera: &Camera, random: &mut Random) -> View {
+    let axes = camera.axes();
+    let view = look_to_mat4(camera.eye, axes.col(2), axes.col(1));
+    let (left, bottom) = (random.uniform(-1.0, 0.2), random.uniform(-1.0, 0.2));
+    let far = random.uniform(4e3, 4e4);
+    let mut projection = directx::frustum(left, left + 0.8, bottom, bottom + 0.7, 1.0, 2.0);
+    let depth = Depth::new(DepthDirection::Reversed, 2.0, far).unwrap();
+    let [a, b] = depth.terms();
+    (projection.z_axis.z, projection.w_axis.z) = (-a, b);
+    View::from_matrices(view, projection, [64, 64]).unwrap()
 }
 
 fn options(clip_size: i64, size_px: [u32; 2]) -> HeadlessOptions {
@@ -279,6 +294,14 @@ fn compare(device: &[Vertex], twin: &[Vertex], clipmap: &Clipmap) -> (f64, usize
             let bound = 2.0 * ulp * sum + height_bound * f64::from(columns[1].abs()) + f64::MIN_POSITIVE;
             worst = worst.max(f64::from((d.clip[k] - t.clip[k]).abs()) / bound);
         }
+        let [a, b] = view.depth.map(f64::from);
+        let w = f64::from(t.clip[3]);
+        let of_w = a.abs() * f64::from((d.clip[3] - t.clip[3]).abs());
+        let bound = of_w + 2.0 * ulp * ((a * w).abs() + b.abs());
+        worst = worst.max(f64::from((d.clip[2] - t.clip[2]).abs()) / bound);
+        // Independent of the twin: z follows from w.
+        let z_off = (f64::from(t.clip[2]) - (a * w + b)).abs();
+        worst = worst.max(z_off / (2.0 * ulp * ((a * w).abs() + b.abs())));
     }
     (worst, differing)
 }
@@ -295,7 +318,11 @@ fn displaced_vertices_equal_the_twin_s() {
         let mut headless = Headless::new(gpu.clone(), &levels, &options(clip_size, [64, 64])).unwrap();
         for k in 0..20 {
             let camera = camera(&mut random, &levels.grid);
-            headless.frame(&levels, &camera, 0.0).unwrap();
+            let mut view = View::new(camera, [64, 64]).unwrap();
+            if k % 3 == 1 {
+                view = off_axis(&camera, &mut random);
+            }
+            headless.frame_of(&levels, &view, 0.0).unwrap();
             let twin = displace_on_cpu(headless.clipmap());
             let device = displace_on_device(&headless);
             let (worst, differing) = compare(&device, &twin, headless.clipmap());
@@ -314,9 +341,7 @@ fn displaced_vertices_equal_the_twin_s() {
                 let mut raised = self::levels(width, height);
                 raised.height = |l, i, j| ground(l, i, j) + if (7 * i + j) % 13 == 0 { 0.01 } else { 0.0 };
                 let mut other = Clipmap::new(&raised, &options(clip_size, [64, 64]).clipmap).unwrap();
-                other
-                    .update(&raised, &View::new(camera, [64, 64]).unwrap(), 0.0)
-                    .unwrap();
+                other.update(&raised, &view, 0.0).unwrap();
                 // `fill` follows the bounds, which may differ.
                 let patches = |c: &Clipmap| -> Vec<_> {
                     c.selection().instances().map(|i| (i.level, i.origin)).collect()

@@ -25,6 +25,9 @@ CLIPSCAPE_OUT=$(mktemp -d)
 export CLIPSCAPE_OUT
 trap 'rm -rf "$CLIPSCAPE_OUT"' EXIT
 trap 'exit 130' INT TERM
+# What an embedding program takes: drawing, without the command line and the DEM formats.
+step cargo run --locked --quiet --no-default-features --features gpu --example embed -- "$CLIPSCAPE_OUT/embed.png"
+[ -s "$CLIPSCAPE_OUT/embed.png" ] || { echo 'clipscape: the example left no picture' >&2; exit 1; }
 step sh tools/demo.sh --frames 0..3
 for file in pyrenees.terrain.exr contact-sheet.png flight.png flight.jsonl; do
     [ -s "$CLIPSCAPE_OUT/$file" ] || { echo "clipscape: the demo left no $file" >&2; exit 1; }

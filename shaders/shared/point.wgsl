@@ -26,7 +26,8 @@ fn tint(point: SurfacePoint) -> vec3<f32> {
 
 // What is left of a point's radiance at the eye, and the light that the air between them adds.
 fn through_air(radiance: vec3<f32>, from_eye_m: vec3<f32>) -> vec3<f32> {
-    let distance_m = length(from_eye_m);
+    // An infinite length, of a point farther than f32 can square, times no density at all would be no number.
+    let distance_m = min(length(from_eye_m), 1e18);
     let eye_m = (view.eye_height_m.x - shade.low_m) * view.vertical_scale;
     let clear = transmission(distance_m, eye_m, eye_m + from_eye_m.y);
     let level_ray = vec3(from_eye_m.x, 0.0, from_eye_m.z) / max(length(from_eye_m.xz), 1e-20);

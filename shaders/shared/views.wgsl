@@ -9,11 +9,13 @@ fn view_light(point: SurfacePoint) -> vec4<f32> {
     return vec4(vec3(grey(point)), 1.0);
 }
 
-// A hue per level; white where the ring slides it into the next one, black where that is held.
+// A hue per level; white where the ring slides it into the next one, hatched where that is held: the black share of the
+// hatching is the held one.
 fn view_level(point: SurfacePoint) -> vec4<f32> {
     let shares = alpha_shares(point.level, point.from_eye);
     let banded = mix(level_hue(point.level), vec3(1.0), 0.7 * shares.x);
-    return vec4(mix(banded, vec3(0.0), 0.8 * shares.y) * (0.25 + 0.75 * grey(point)), 1.0);
+    let hatched = hatch(grid_place(point.level, point.from_eye), shares.y);
+    return vec4(mix(banded, vec3(0.0), 0.85 * hatched) * (0.25 + 0.75 * grey(point)), 1.0);
 }
 
 // The triangles' edges over the surface.
@@ -55,6 +57,16 @@ fn wire(place: vec2<f32>) -> f32 {
     let share = clamp(WIRE_PX * per_px, vec3(0.0), vec3(1.0));
     let fine = mix(lines, share, smoothstep(vec3(0.2), vec3(0.5), per_px));
     return max(fine.x, max(fine.y, fine.z));
+}
+
+// Black stripes across a level's grid, one every four cells, that cover `share` of the ground; where stripes are of a few
+// pixels, an even black of that share.
+fn hatch(place: vec2<f32>, share: f32) -> f32 {
+    let across = (place.x + place.y) * 0.25;
+    let per_px = fwidth(across);
+    let off_middle = abs(fract(across) - 0.5) * 2.0;
+    let stripe = clamp((share - off_middle) / (2.0 * per_px) + 0.5, 0.0, 1.0);
+    return select(mix(stripe, share, smoothstep(0.1, 0.3, per_px)), 0.0, share == 0.0);
 }
 
 // The ring's and the held field's share of alpha at a point between vertices.

@@ -126,9 +126,22 @@ impl Headless {
     /// [`ErrorKind::Misuse`] for a camera of other than finite numbers, [`ErrorKind::Device`] where the device fails;
     /// those of `levels`.
     pub fn frame(&mut self, levels: &dyn Levels, camera: &crate::Camera, time_s: f64) -> Result<Frame> {
+        self.frame_of(levels, &View::new(*camera, self.options.size_px)?, time_s)
+    }
+
+    /// Draws the frame of a view at `time_s` seconds, which must be of these frames' size and of reversed depth.
+    ///
+    /// # Errors
+    /// As [`Headless::frame`], and [`ErrorKind::Misuse`] for a view of another size or of forward depth.
+    pub fn frame_of(&mut self, levels: &dyn Levels, view: &View, time_s: f64) -> Result<Frame> {
         let start = Instant::now();
-        let view = View::new(*camera, self.options.size_px)?;
-        let update = *self.clipmap.update(levels, &view, time_s)?;
+        if view.size_px != self.options.size_px {
+            let [w, h] = view.size_px;
+            let what = format!("is of {w}x{h} pixels");
+            let [w, h] = self.options.size_px;
+            return Err(Error::new(ErrorKind::Misuse, "view", what).advice(format!("frames are of {w}x{h}")));
+        }
+        let update = *self.clipmap.update(levels, view, time_s)?;
         let planned = Instant::now();
         let mut encoder = self
             .gpu
