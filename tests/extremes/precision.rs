@@ -69,7 +69,10 @@ fn a_shift_of_the_index_offset_changes_no_bit() {
         [FAR + 12_345, 777 - FAR],
         [63, -29],
     ]);
-    for (options, has_light) in views().iter().flat_map(|v| [(v, true), (v, false)]) {
+    let views = views();
+    let traced = views.iter().map(|options| (options, true));
+    // Without traced light all follows from slopes, which lie in the same texels.
+    for (options, has_light) in traced.chain([(&views[0], false)]) {
         let Some(unshifted) = shifted([0, 0], has_light, options) else {
             return;
         };

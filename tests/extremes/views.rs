@@ -1,12 +1,12 @@
 //! Extreme views and parameters: fields of view, angles, pictures, clip sizes, levels, transitions, vertical scales.
 
-use clipscape::camera::Camera;
+use clipscape::camera::{Camera, View};
 use clipscape::clipmap::{ClipmapOptions, Ring};
 use clipscape::grid::Grid;
 use clipscape::pyramid::Pyramid;
 use glam::DVec3;
 
-use crate::harness::{Subject, camera, pyramid, rough};
+use crate::harness::{Subject, camera, pyramid, rough, small, unfit_numbers, updated};
 
 fn terrain() -> Pyramid {
     pyramid(Grid::new(500, 380, [10.0, 10.0]), rough)
@@ -110,6 +110,21 @@ fn vertical_scales() {
         subject.check(&cameras);
         subject.check(&upward);
     }
+}
+
+#[test]
+fn control_numbers_that_are_not_finite_are_seen() {
+    let levels = terrain();
+    let view = View::new(camera(eyes()[0], 60.0, -20.0), [48, 32]).unwrap();
+    let clipmap = |vertical_scale| {
+        let options = ClipmapOptions {
+            vertical_scale,
+            ..small()
+        };
+        updated(&levels, &options, &view)
+    };
+    assert!(unfit_numbers(&clipmap(1.0)).is_empty());
+    assert!(!unfit_numbers(&clipmap(1e37)).is_empty());
 }
 
 /// The check of pictures must see colours that are no number or none of a picture.
