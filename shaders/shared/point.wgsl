@@ -26,7 +26,7 @@ fn tint(point: SurfacePoint) -> vec3<f32> {
 
 // What is left of a point's radiance at the eye, and the light that the air between them adds.
 fn through_air(radiance: vec3<f32>, from_eye_m: vec3<f32>) -> vec3<f32> {
-    // An infinite length, of a point farther than f32 can square, times no density at all would be no number.
+    // Farther than f32 can square a length is infinite, and times no density at all no number.
     let distance_m = min(length(from_eye_m), 1e18);
     let eye_m = (view.eye_height_m.x - shade.low_m) * view.vertical_scale;
     let clear = transmission(distance_m, eye_m, eye_m + from_eye_m.y);

@@ -29,12 +29,13 @@ fn illumination(sun: f32, sky: f32) -> vec3<f32> {
 // Share of the light that reaches the eye through the air, by wavelength: density falls with height by HAZE_SCALE_M.
 // `from_m` and `to_m` are the heights of the ends above the lowest ground.
 fn transmission(distance_m: f32, from_m: f32, to_m: f32) -> vec3<f32> {
-    let a = max(from_m, 0.0) / HAZE_SCALE_M;
-    let b = max(to_m, 0.0) / HAZE_SCALE_M;
+    // Some adapters' exp is no number far below 0, where it should vanish; at -80 it has.
+    let a = clamp(from_m / HAZE_SCALE_M, 0.0, 80.0);
+    let b = clamp(to_m / HAZE_SCALE_M, 0.0, 80.0);
     let difference = b - a;
     let sloping = (exp(-a) - exp(-b)) / select(difference, 1.0, abs(difference) < 1e-3);
     let density = select(sloping, exp(-0.5 * (a + b)), abs(difference) < 1e-3);
-    return exp(-HAZE_PER_M * (density * distance_m));
+    return exp(-min(HAZE_PER_M * (density * distance_m), vec3(80.0)));
 }
 
 // The sky in a direction (unit vector): horizon to zenith, brighter around the sun.
@@ -47,9 +48,10 @@ fn sky_colour(direction: vec3<f32>) -> vec3<f32> {
     return below + SUN_GLOW * (glow * glow * (1.0 - smoothstep(0.0, 0.3, -direction.y)));
 }
 
-// From radiance to what a display shows, before its own encoding.
+// From radiance to what a display shows, before its own encoding. Over heights that differ by 1e30 m a rasteriser's own
+// products overflow, and what it interpolates is no number: that is to be black, and no number to whoever reads it.
 fn tone(radiance: vec3<f32>) -> vec3<f32> {
-    return 1.0 - exp(-EXPOSURE * radiance);
+    return 1.0 - exp(-EXPOSURE * max(radiance, vec3(0.0)));
 }
 
 // For targets that do not encode sRGB themselves.

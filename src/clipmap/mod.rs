@@ -44,6 +44,9 @@ use held::{FadeReport, Moment};
 use identity::Identity;
 use window::Scratch;
 
+/// The greatest factor on heights, either way: heights up to 1e30 m times it stay within f32.
+pub const MAX_VERTICAL_SCALE: f64 = 1e6;
+
 /// How a clipmap is laid out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClipmapOptions {
@@ -53,7 +56,7 @@ pub struct ClipmapOptions {
     pub levels: Option<u32>,
     /// Width of the transition band in steps, 0 to `N/4 - 10`; `N/10` rounded down where none.
     pub transition: Option<i64>,
-    /// Factor on heights relative to the eye; may be 0 or negative.
+    /// Factor on heights relative to the eye; may be 0 or negative, within [`MAX_VERTICAL_SCALE`] of 0.
     pub vertical_scale: f64,
     /// Whether patches that are not seen are left out.
     pub cull: bool,
@@ -102,11 +105,12 @@ impl ClipmapOptions {
     pub fn check(&self) -> Result<()> {
         self.ring()?;
         let misuse = |subject: &str, what: String| Error::new(ErrorKind::Misuse, subject, what);
-        if !self.vertical_scale.is_finite() {
-            return Err(misuse(
-                "vertical scale",
-                format!("{} is not finite", self.vertical_scale),
-            ));
+        if self.vertical_scale.is_nan() || self.vertical_scale.abs() > MAX_VERTICAL_SCALE {
+            let what = format!(
+                "{:?} is not within {MAX_VERTICAL_SCALE} of 0",
+                self.vertical_scale
+            );
+            return Err(misuse("vertical scale", what));
         }
         if self.levels == Some(0) {
             return Err(misuse("levels", "0 levels draw nothing".into()).advice("ask for at least 1"));
@@ -182,6 +186,8 @@ impl Clipmap {
     /// [`ErrorKind::Misuse`] for options out of range; those of `levels`.
     pub fn new(levels: &dyn Levels, options: &ClipmapOptions) -> Result<Self> {
         let grid = *levels.grid();
+        grid.check()
+            .map_err(|what| Error::new(ErrorKind::Misuse, "terrain", what))?;
         options.check()?;
         let ring = options.ring()?;
         let fitting = grid.levels_until(ring.clip_size).min(levels.level_count());

@@ -221,11 +221,12 @@ impl Window {
             if source.heights(self.level, piece, &mut scratch.heights)? == Arrival::Missing {
                 return Ok(Arrival::Missing);
             }
-            // A source of the caller's own may not know what stands for no data on the GPU.
+            // A source of the caller's own may not know that infinities, and what stands for no data on the GPU, are none.
+            let none = |h: &&mut f32| !h.is_finite() || **h == VOID_HEIGHT;
             scratch
                 .heights
                 .iter_mut()
-                .filter(|h| **h == VOID_HEIGHT)
+                .filter(none)
                 .for_each(|h| *h = f32::NAN);
             let first = self.index(piece.x0, piece.z0);
             copy_rows(&scratch.heights, &mut self.heights[first..], piece, self.n);

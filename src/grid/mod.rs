@@ -19,6 +19,9 @@ pub const MAX_LEVELS: u32 = 32;
 /// The greatest width and height of a DEM in samples: the GPU addresses samples of one DEM in i32.
 pub const MAX_SIZE: i64 = 1 << 30;
 
+/// The least and the greatest spacing in metres: what is made of them stays within f32 on the GPU.
+pub const SPACING_M: [f64; 2] = [1e-9, 1e12];
+
 /// The greatest index offset in samples: indices beside it still fit i64 with room to spare.
 const MAX_OFFSET: u64 = 1 << 60;
 
@@ -69,7 +72,7 @@ impl Size {
 pub struct Grid {
     /// Size of level 0 in samples; both sides at least 1 and at most [`MAX_SIZE`].
     pub size: Size,
-    /// Metres between columns and between rows, finite and above 0.
+    /// Metres between columns and between rows, within [`SPACING_M`].
     pub spacing_m: [f64; 2],
     /// Column and row of sample (0, 0) in a larger grid of which this one is a crop. It shifts toroidal
     /// slots and anchors, nothing else.
@@ -126,9 +129,12 @@ impl Grid {
                 "a size of {width} x {height} samples is above {MAX_SIZE} a side"
             ));
         }
-        if !self.spacing_m.iter().all(|s| s.is_finite() && *s > 0.0) {
+        let [least, most] = SPACING_M;
+        if !self.spacing_m.iter().all(|s| (least..=most).contains(s)) {
             let [dx, dz] = self.spacing_m;
-            return Err(format!("a spacing of {dx} x {dz} m is not above 0 and finite"));
+            return Err(format!(
+                "a spacing of {dx:?} x {dz:?} m is not within {least:?} to {most:?} m"
+            ));
         }
         if self.offset.iter().any(|o| o.unsigned_abs() > MAX_OFFSET) {
             let [x, z] = self.offset;
@@ -192,6 +198,8 @@ mod tests {
         assert!(Grid::new(5, MAX_SIZE + 1, [1.0, 1.0]).check().is_err());
         assert!(Grid::new(5, 5, [f64::NAN, 1.0]).check().is_err());
         assert!(Grid::new(5, 5, [1.0, 0.0]).check().is_err());
+        assert!(Grid::new(5, 5, [1e-300, 1.0]).check().is_err());
+        assert!(Grid::new(5, 5, [1.0, f64::INFINITY]).check().is_err());
         assert!(Grid::new(5, 5, [1e-3, 1e6]).check().is_ok());
         let shifted = |x| Grid {
             offset: [x, 0],

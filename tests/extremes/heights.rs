@@ -11,7 +11,7 @@ use clipscape::stream::Terrain;
 use glam::DVec3;
 
 use crate::harness::{Subject, camera, pyramid, small, updated};
-use crate::support::{hash, hills};
+use crate::support::{Formula, hash, hills};
 
 const SPACING_M: f64 = 30.0;
 
@@ -181,6 +181,12 @@ fn infinite_heights_are_no_data() {
         );
     }
     Subject::new("infinities", &infinite).check(&cameras(-200.0, 200.0));
+    // A source of the caller's own that lets infinities through is drawn no differently.
+    let own = Formula::new(grid(), |_: u32, i: i64, j: i64| match hash(5, i, j) {
+        h if h < 0.02 => f32::INFINITY,
+        _ => hills(0, i, j),
+    });
+    Subject::new("infinities of the caller's own", &own).check(&cameras(-200.0, 200.0));
     // Control: as heights they would not be the same.
     let high = holed([f32::MAX, -1e38]);
     assert_ne!(bits(&high, 0), bits(&missing, 0));

@@ -1,5 +1,6 @@
 //! Extreme views and parameters: fields of view, angles, pictures, clip sizes, levels, transitions, vertical scales.
 
+use clipscape::ErrorKind;
 use clipscape::camera::{Camera, View};
 use clipscape::clipmap::{ClipmapOptions, Ring};
 use clipscape::grid::Grid;
@@ -113,18 +114,28 @@ fn vertical_scales() {
 }
 
 #[test]
-fn control_numbers_that_are_not_finite_are_seen() {
-    let levels = terrain();
-    let view = View::new(camera(eyes()[0], 60.0, -20.0), [48, 32]).unwrap();
-    let clipmap = |vertical_scale| {
+fn vertical_scales_beyond_f32_are_refused() {
+    for vertical_scale in [f64::NAN, f64::INFINITY, -1e37, 1e300] {
         let options = ClipmapOptions {
             vertical_scale,
             ..small()
         };
-        updated(&levels, &options, &view)
-    };
-    assert!(unfit_numbers(&clipmap(1.0)).is_empty());
-    assert!(!unfit_numbers(&clipmap(1e37)).is_empty());
+        assert_eq!(
+            options.check().unwrap_err().kind(),
+            ErrorKind::Misuse,
+            "{vertical_scale}"
+        );
+    }
+}
+
+#[test]
+fn control_numbers_that_are_not_finite_are_seen() {
+    let levels = terrain();
+    let view = View::new(camera(eyes()[0], 60.0, -20.0), [48, 32]).unwrap();
+    let mut clipmap = updated(&levels, &small(), &view);
+    assert!(unfit_numbers(&clipmap).is_empty());
+    clipmap.frame_mut().0.vertical_scale = 1e37;
+    assert!(!unfit_numbers(&clipmap).is_empty());
 }
 
 /// The check of pictures must see colours that are no number or none of a picture.
