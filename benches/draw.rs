@@ -38,9 +38,8 @@ const FRAME_STEP: usize = 4;
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct StaticVertex {
-    from_eye: [f32; 2],
-    height: f32,
-    alpha: f32,
+    /// Samples from the eye, height, alpha.
+    ground: [f32; 4],
     valid: f32,
     level: u32,
 }
@@ -48,26 +47,22 @@ struct StaticVertex {
 const STATIC_SHADER: &str = "
 #import terrain.wgsl
 
-@vertex
-fn static_vertex(
-    @location(0) from_eye: vec2<f32>,
-    @location(1) height: f32,
-    @location(2) alpha: f32,
-    @location(3) valid: f32,
-    @location(4) level: u32,
-) -> Varyings {
-    let east = from_eye.x * view.spacing_m.x;
-    let up = ((height - view.eye_height_m.x) - view.eye_height_m.y) * view.vertical_scale;
-    let south = from_eye.y * view.spacing_m.y;
+fn projected(ground: vec4<f32>) -> vec4<f32> {
+    let east = ground.x * view.spacing_m.x;
+    let up = ((ground.z - view.eye_height_m.x) - view.eye_height_m.y) * view.vertical_scale;
+    let south = ground.y * view.spacing_m.y;
     let position = view.clip_from_east * east + view.clip_from_up * up + view.clip_from_south * south;
-    var out: Varyings;
-    out.position = vec4(position.x, position.y, view.near_m, position.w);
-    out.from_eye = from_eye;
-    out.height = height;
-    out.alpha = alpha;
-    out.valid = valid;
-    out.level = level;
-    return out;
+    return vec4(position.x, position.y, view.near_m, position.w);
+}
+
+@vertex
+fn static_whole(@location(0) ground: vec4<f32>, @location(1) valid: f32, @location(2) level: u32) -> WholeVaryings {
+    return WholeVaryings(projected(ground), ground, level);
+}
+
+@vertex
+fn static_ragged(@location(0) ground: vec4<f32>, @location(1) valid: f32, @location(2) level: u32) -> RaggedVaryings {
+    return RaggedVaryings(projected(ground), ground, level, valid);
 }
 ";
 
@@ -90,9 +85,12 @@ impl StaticMesh {
             vertices.extend((0..corners * corners).map(|k| {
                 let vertex = displace(clipmap, instance, k % corners, k / corners);
                 StaticVertex {
-                    from_eye: vertex.from_eye,
-                    height: vertex.height,
-                    alpha: vertex.alpha,
+                    ground: [
+                        vertex.from_eye[0],
+                        vertex.from_eye[1],
+                        vertex.height,
+                        vertex.alpha,
+                    ],
                     valid: f32::from(u8::from(!vertex.void)),
                     level: instance.level,
                 }
@@ -151,30 +149,25 @@ impl StaticPipelines {
     fn new(gpu: &Gpu, headless: &Headless) -> Result<Self> {
         let module = module(gpu, "static.wgsl", STATIC_SHADER)?;
         let layout = headless.renderer().bind_group_layout();
-        let make = |ragged: f64| {
-            let mut constants = shader_constants().to_vec();
-            constants.push(("RAGGED", ragged));
+        let make = |entries| {
             let buffers = [Some(wgpu::VertexBufferLayout {
                 array_stride: size_of::<StaticVertex>() as u64,
                 step_mode: wgpu::VertexStepMode::Vertex,
-                attributes: &wgpu::vertex_attr_array![
-                    0 => Float32x2, 1 => Float32, 2 => Float32, 3 => Float32, 4 => Uint32
-                ],
+                attributes: &wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32, 2 => Uint32],
             })];
-            let entries = ["static_vertex", "fragment"];
             pipeline(
                 gpu,
                 "clipscape bench static",
                 &module,
                 &[Some(layout)],
-                &constants,
+                &shader_constants(),
                 entries,
                 &buffers,
             )
         };
         Ok(Self {
-            whole: make(0.0),
-            ragged: make(1.0),
+            whole: make(["static_whole", "whole_fragment"]),
+            ragged: make(["static_ragged", "ragged_fragment"]),
         })
     }
 

@@ -14,6 +14,10 @@
 //! `D_l / T` of 1 (fact (b): its whole patch is let go at 1), and that of level `l + 1` within `D_{l+1} / T` of 0 (fact
 //! (c)). So the bound is the sum over the levels that draw the place in either frame.
 //!
+//! *Data that arrive late* add the held field's share of alpha: it falls by the time that has passed over
+//! [`FADE_S`], or rises by at most 1 a step that the eye moves (see `HeldField`); and, through the ground under the eye,
+//! to the climb. Frames that report pops, of a budget too small for anything better, are left out.
+//!
 //! *Rounding.* Each `d` is off by less than `2^-22 R` steps (a difference and a product of f32, and the climb's rounding),
 //! alpha by 2^-24 more, and a height by `2^-22` of the greatest height; each counts twice, once for each frame.
 
@@ -24,7 +28,7 @@ mod support;
 use std::collections::HashMap;
 
 use clipscape::camera::{Camera, View};
-use clipscape::clipmap::{Clipmap, ClipmapOptions, Instance, displace};
+use clipscape::clipmap::{Clipmap, ClipmapOptions, FADE_S, Instance, Wait, displace};
 use clipscape::grid::{Grid, PATCH, Patch};
 use clipscape::levels::Levels;
 use clipscape::progress::Silent;
@@ -51,14 +55,17 @@ fn terrain() -> Pyramid {
     pyramid
 }
 
-fn clipmap(levels: &dyn Levels, transition: i64) -> Clipmap {
-    let options = ClipmapOptions {
+fn options(transition: i64) -> ClipmapOptions {
+    ClipmapOptions {
         clip_size: CLIP_SIZE,
         transition: Some(transition),
         cull: false,
         ..Default::default()
-    };
-    Clipmap::new(levels, &options).unwrap()
+    }
+}
+
+fn clipmap(levels: &dyn Levels, transition: i64) -> Clipmap {
+    Clipmap::new(levels, &options(transition)).unwrap()
 }
 
 fn camera(x_samples: f64, y: f64, z_samples: f64, heading_deg: f64) -> Camera {
@@ -72,9 +79,9 @@ fn camera(x_samples: f64, y: f64, z_samples: f64, heading_deg: f64) -> Camera {
 }
 
 /// Brings `clipmap` to `camera` and measures what it draws.
-fn frame(clipmap: &mut Clipmap, levels: &dyn Levels, camera: &Camera) -> Surface {
+fn frame(clipmap: &mut Clipmap, levels: &dyn Levels, camera: &Camera, time_s: f64) -> Surface {
     clipmap
-        .update(levels, &View::new(*camera, [64, 48]).unwrap(), 0.0)
+        .update(levels, &View::new(*camera, [64, 48]).unwrap(), time_s)
         .unwrap();
     let instances: Vec<_> = clipmap.selection().instances().copied().collect();
     Surface::new(clipmap, &instances)
@@ -143,6 +150,8 @@ impl Surface {
 struct Bound {
     /// `M_l` at every vertex of level 0, level by level.
     steps_m: Vec<Vec<f64>>,
+    /// The greatest `|c - h|` of each level.
+    greatest_steps_m: Vec<f64>,
     /// The greatest slopes east and south of any level from 1 on.
     slopes: [f64; 2],
     greatest_m: f64,
@@ -180,8 +189,13 @@ impl Bound {
             };
             grid.size.rect().cells().map(place).collect()
         };
+        let steps_m: Vec<Vec<f64>> = (0..pyramid.level_count()).map(level_steps).collect();
         Self {
-            steps_m: (0..pyramid.level_count()).map(level_steps).collect(),
+            greatest_steps_m: steps_m
+                .iter()
+                .map(|s| s.iter().copied().fold(0.0, f64::max))
+                .collect(),
+            steps_m,
             slopes,
             greatest_m: (0..pyramid.level_count())
                 .flat_map(|l| pyramid.level(l))
@@ -189,17 +203,24 @@ impl Bound {
         }
     }
 
-    /// The most that the drawn height of a place may change between frames from `before` and `after`.
-    fn at(&self, place: usize, levels: [u32; 2], before: &Camera, after: &Camera) -> f64 {
+    /// The most that the drawn height of a place may change between frames from `before` and `after`, while what has
+    /// arrived fades in by the share `faded`.
+    fn at(&self, place: usize, levels: [u32; 2], before: &Camera, after: &Camera, faded: f64) -> f64 {
         let moved = (after.eye - before.eye).abs();
         let samples = (moved.x / SPACING_M[0]).max(moved.z / SPACING_M[1]);
-        let climbed = moved.y + self.slopes[0] * moved.x + self.slopes[1] * moved.z;
+        let ground = faded * self.greatest_steps_m[1..].iter().sum::<f64>();
+        let climbed = moved.y + self.slopes[0] * moved.x + self.slopes[1] * moved.z + ground;
         let climb = 1.25 * climbed / (SPACING_M[0] * SPACING_M[1]).sqrt();
         let transition = TRANSITION as f64;
         let level = |level: u32| {
             let change = samples.max(climb) / f64::from(1u32 << level);
             let rounding = 2.0 * (2f64.powi(-22) * REACH / transition + 2f64.powi(-24));
-            self.steps_m[level as usize][place] * (change / transition + rounding)
+            let held = if faded > 0.0 {
+                faded + samples / f64::from(1u32 << level)
+            } else {
+                0.0
+            };
+            self.steps_m[level as usize][place] * (change / transition + held + rounding)
         };
         let (low, high) = (levels[0].min(levels[1]), levels[0].max(levels[1]));
         (low..=high).map(level).sum::<f64>() + 2.0 * 2f64.powi(-22) * self.greatest_m
@@ -222,12 +243,12 @@ struct Found {
 }
 
 impl Found {
-    fn add(&mut self, bound: &Bound, surfaces: [&Surface; 2], cameras: [&Camera; 2]) {
+    fn add(&mut self, bound: &Bound, surfaces: [&Surface; 2], cameras: [&Camera; 2], faded: f64) {
         let [before, after] = surfaces;
         for place in 0..before.heights.len() {
             let levels = [before.levels[place], after.levels[place]];
             let change = (after.heights[place] - before.heights[place]).abs();
-            let share = change / bound.at(place, levels, cameras[0], cameras[1]);
+            let share = change / bound.at(place, levels, cameras[0], cameras[1], faded);
             self.change_m = self.change_m.max(change);
             self.share = self.share.max(share);
             self.pops += usize::from(share > 1.0);
@@ -242,10 +263,10 @@ fn fly(transition: i64, cameras: &[Camera]) -> Found {
     let bound = Bound::new(&levels);
     let mut clipmap = clipmap(&levels, transition);
     let mut found = Found::default();
-    let mut before = frame(&mut clipmap, &levels, &cameras[0]);
+    let mut before = frame(&mut clipmap, &levels, &cameras[0], 0.0);
     for pair in cameras.windows(2) {
-        let after = frame(&mut clipmap, &levels, &pair[1]);
-        found.add(&bound, [&before, &after], [&pair[0], &pair[1]]);
+        let after = frame(&mut clipmap, &levels, &pair[1], 0.0);
+        found.add(&bound, [&before, &after], [&pair[0], &pair[1]], 0.0);
         before = after;
     }
     found
@@ -327,7 +348,7 @@ fn control_a_level_let_go_before_alpha_is_1_is_caught() {
     let bound = Bound::new(&levels);
     let mut clipmap = clipmap(&levels, TRANSITION);
     let here = camera(ARRIVAL - 5.0, 70.0, 150.3, 80.0);
-    let before = frame(&mut clipmap, &levels, &here);
+    let before = frame(&mut clipmap, &levels, &here, 0.0);
     let mut instances: Vec<_> = clipmap.selection().instances().copied().collect();
     // The parent of a patch of level 0 that is still on its way to 1.
     let early = instances.iter().find(|i| {
@@ -344,6 +365,62 @@ fn control_a_level_let_go_before_alpha_is_1_is_caught() {
     let after = Surface::new(&clipmap, &instances);
     let mut found = Found::default();
     let moved = camera(ARRIVAL - 5.0 + 0.001, 70.0, 150.3, 80.0);
-    found.add(&bound, [&before, &after], [&here, &moved]);
+    found.add(&bound, [&before, &after], [&here, &moved], 0.0);
     assert!(found.pops > 50, "{found:?}");
+}
+
+/// Flies over data that come under a budget, `fps` frames a second; also how many frames had data missing, and popped.
+fn fly_late(cameras: &[Camera], budget_bytes: u64, fps: f64, fade: bool) -> (Found, [u32; 2]) {
+    let levels = terrain();
+    let bound = Bound::new(&levels);
+    let options = ClipmapOptions {
+        wait: Wait::None,
+        upload_budget_bytes: Some(budget_bytes),
+        ..options(TRANSITION)
+    };
+    let mut clipmap = Clipmap::new(&levels, &options).unwrap();
+    let mut found = Found::default();
+    let mut counts = [0, 0];
+    let mut before = frame(&mut clipmap, &levels, &cameras[0], 0.0);
+    for (pair, k) in cameras.windows(2).zip(1..) {
+        // Without a fade, as if a second passed from frame to frame: what arrives is there at once.
+        let time_s = f64::from(k) / if fade { fps } else { 1.0 };
+        let after = frame(&mut clipmap, &levels, &pair[1], time_s);
+        let report = clipmap.report();
+        counts[0] += u32::from(!report.complete);
+        counts[1] += u32::from(report.pops > 0);
+        if report.pops == 0 {
+            found.add(
+                &bound,
+                [&before, &after],
+                [&pair[0], &pair[1]],
+                1.0 / (fps * FADE_S),
+            );
+        }
+        before = after;
+    }
+    (found, counts)
+}
+
+#[test]
+fn data_that_arrive_late_fade_in() {
+    let spot = vec![camera(171.4, 70.0, 150.3, 80.0); 80];
+    let creeping = creep(171.4, 70.0, 80);
+    let flying = |k| camera(120.0 + 0.7 * f64::from(k), 70.0, 150.3 + 0.3 * f64::from(k), 80.0);
+    for (what, cameras, budget_bytes) in [
+        ("on the spot", spot.clone(), 20_000),
+        ("creeping", creeping, 20_000),
+        ("flying", (0..120).map(flying).collect(), 20_000),
+    ] {
+        let (found, [late, popped]) = fly_late(&cameras, budget_bytes, 60.0, true);
+        println!("{what}: {late} of {} frames late, {popped} popped", cameras.len());
+        assert_smooth(what, &found);
+        assert!(
+            late > 20 && popped * 10 < cameras.len() as u32,
+            "{what}: {late}, {popped}"
+        );
+        assert!(found.change_m > 0.1, "{what}: {found:?}");
+    }
+    let (found, _) = fly_late(&spot, 20_000, 60.0, false);
+    assert!(found.pops > 1_000, "control: without the fade it pops: {found:?}");
 }

@@ -44,11 +44,23 @@ impl ClipmapRenderer {
         let pipelines = pipeline_layout(device, &layout);
         let terrain = shader::module(device, "terrain.wgsl", &options.parts())?;
         let closer = shader::module(device, "closer.wgsl", &options.parts())?;
-        let pipeline = |label, module, ragged| pipeline(device, label, module, &pipelines, options, ragged);
+        let pipeline = |label, module, entries| pipeline(device, label, module, &pipelines, options, entries);
         Ok(Self {
-            whole: pipeline("clipscape terrain whole patches", &terrain, Some(false))?,
-            ragged: pipeline("clipscape terrain ragged patches", &terrain, Some(true))?,
-            closer: pipeline("clipscape terrain closing triangles", &closer, None)?,
+            whole: pipeline(
+                "clipscape terrain whole patches",
+                &terrain,
+                ["whole_vertex", "whole_fragment"],
+            )?,
+            ragged: pipeline(
+                "clipscape terrain ragged patches",
+                &terrain,
+                ["ragged_vertex", "ragged_fragment"],
+            )?,
+            closer: pipeline(
+                "clipscape terrain closing triangles",
+                &closer,
+                ["vertex", "fragment"],
+            )?,
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("clipscape light sampler"),
                 address_mode_u: wgpu::AddressMode::Repeat,
@@ -219,17 +231,15 @@ fn pipeline(
     module: &wgpu::ShaderModule,
     layout: &wgpu::PipelineLayout,
     options: &RendererOptions,
-    ragged: Option<bool>,
+    [vertex, fragment]: [&str; 2],
 ) -> Result<wgpu::RenderPipeline> {
     let on = |flag: bool| f64::from(u8::from(flag));
-    let mut constants = vec![
+    let constants = [
         ("TRACED_LIGHT", on(options.traced_light)),
         ("TINT", on(options.tint)),
         ("HAZE", on(options.haze)),
         ("ENCODE_SRGB", on(options.encodes_srgb())),
     ];
-    // Only patches are of two kinds; closing triangles may always have to be discarded.
-    constants.extend(ragged.map(|ragged| ("RAGGED", on(ragged))));
     let compilation_options = wgpu::PipelineCompilationOptions {
         constants: &constants,
         ..Default::default()
@@ -240,7 +250,7 @@ fn pipeline(
             layout: Some(layout),
             vertex: wgpu::VertexState {
                 module,
-                entry_point: Some("vertex"),
+                entry_point: Some(vertex),
                 compilation_options: compilation_options.clone(),
                 buffers: &[Some(wgpu::VertexBufferLayout {
                     array_stride: size_of::<Instance>() as u64,
@@ -257,7 +267,7 @@ fn pipeline(
             },
             fragment: Some(wgpu::FragmentState {
                 module,
-                entry_point: Some("fragment"),
+                entry_point: Some(fragment),
                 compilation_options,
                 targets: &[Some(options.colour_format.into())],
             }),
