@@ -31,5 +31,5 @@ fn through_air(radiance: vec3<f32>, from_eye_m: vec3<f32>) -> vec3<f32> {
     let eye_m = (view.eye_height_m.x - shade.low_m) * view.vertical_scale;
     let clear = transmission(distance_m, eye_m, eye_m + from_eye_m.y);
     let level_ray = vec3(from_eye_m.x, 0.0, from_eye_m.z) / max(length(from_eye_m.xz), 1e-20);
-    return radiance * clear + sky_colour(level_ray) * (1.0 - clear);
+    return radiance * clear + horizon_colour(level_ray) * (1.0 - clear);
 }

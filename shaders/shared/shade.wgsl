@@ -32,10 +32,24 @@ fn transmission(distance_m: f32, from_m: f32, to_m: f32) -> vec3<f32> {
     // Some adapters' exp is no number far below 0, where it should vanish; at -80 it has.
     let a = clamp(from_m / HAZE_SCALE_M, 0.0, 80.0);
     let b = clamp(to_m / HAZE_SCALE_M, 0.0, 80.0);
-    let difference = b - a;
-    let sloping = (exp(-a) - exp(-b)) / select(difference, 1.0, abs(difference) < 1e-3);
-    let density = select(sloping, exp(-0.5 * (a + b)), abs(difference) < 1e-3);
+    // The mean of exp(-h) from a to b, which is exp(-a) (1 - exp(-x)) / x with x = b - a; near x = 0 by its series.
+    let x = b - a;
+    let is_level = abs(x) < 1e-3;
+    let density = exp(-a) * select((1.0 - exp(-x)) / select(x, 1.0, is_level), 1.0 - 0.5 * x, is_level);
     return exp(-min(HAZE_PER_M * (density * distance_m), vec3(80.0)));
+}
+
+// The sky's glow around the sun, in a direction (unit vector).
+fn sun_glow(direction: vec3<f32>) -> vec3<f32> {
+    let toward_sun = max(dot(direction, shade.to_sun.xyz), 0.0);
+    let squared = toward_sun * toward_sun;
+    let fourth = squared * squared;
+    return SUN_GLOW * (fourth * fourth);
+}
+
+// The sky at the horizon, in a level direction (unit vector): what much air looks like.
+fn horizon_colour(direction: vec3<f32>) -> vec3<f32> {
+    return SKY_HORIZON + sun_glow(direction);
 }
 
 // The sky in a direction (unit vector): horizon to zenith, brighter around the sun.
@@ -43,9 +57,7 @@ fn sky_colour(direction: vec3<f32>) -> vec3<f32> {
     let height = clamp(direction.y, 0.0, 1.0);
     let clear = mix(SKY_HORIZON, SKY_ZENITH, sqrt(height));
     let below = mix(clear, SKY_BELOW, smoothstep(0.0, 0.5, -direction.y));
-    let toward_sun = max(dot(direction, shade.to_sun.xyz), 0.0);
-    let glow = toward_sun * toward_sun * toward_sun * toward_sun;
-    return below + SUN_GLOW * (glow * glow * (1.0 - smoothstep(0.0, 0.3, -direction.y)));
+    return below + sun_glow(direction) * (1.0 - smoothstep(0.0, 0.3, -direction.y));
 }
 
 // From radiance to what a display shows, before its own encoding. Over heights that differ by 1e30 m a rasteriser's own
