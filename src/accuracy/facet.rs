@@ -110,7 +110,9 @@ impl Facet {
         Some(Self {
             depth: depth_along(ray),
             gradient: [depth_along(east), depth_along(south)],
-            depth_rounding: near_m / w * (moved_m / w) + ROUNDING * seen.depths[1] + seen.interpolation(2.0 * half_size_px),
+            depth_rounding: near_m / w * (moved_m / w)
+                + ROUNDING * seen.depths[1]
+                + seen.interpolation(2.0 * half_size_px),
             place_rounding_px: RASTER_PX + moved_m / w * (focal_px + half_size_px),
         })
     }
@@ -171,6 +173,10 @@ impl Seen {
         let range = self.depths[1] - self.depths[0];
         let slenderness = self.extent_px * (self.extent_px + size_px) / (2.0 * self.area_px);
         // Also where it has no area, or is nowhere before the near plane.
-        if slenderness * INTERPOLATION < 1.0 { range * slenderness * INTERPOLATION } else { range }
+        if slenderness * INTERPOLATION < 1.0 {
+            range * slenderness * INTERPOLATION
+        } else {
+            range
+        }
     }
 }

@@ -215,7 +215,9 @@ pub(super) fn behind<S: Surface + ?Sized>(
     end: f64,
 ) -> Result<Vec<[f64; 2]>> {
     if line.track.stands() {
-        let first = plumb(surface, reader, line)?.map(|c| c.along).filter(|a| *a < end);
+        let first = plumb(surface, reader, line)?
+            .map(|c| c.along)
+            .filter(|a| *a < end);
         return Ok(first.map(|along| vec![[along, end]]).unwrap_or_default());
     }
     let mut caster = Caster {
@@ -256,8 +258,9 @@ impl Caster<'_> {
         let Some(span) = line.track.over(roots, step, [line.start, end]) else {
             return Ok(None);
         };
-        line.track
-            .cells(roots, step, span, |a, b, span| self.visit(Patch::new(level, a, b), span))
+        line.track.cells(roots, step, span, |a, b, span| {
+            self.visit(Patch::new(level, a, b), span)
+        })
     }
 
     fn visit(&mut self, patch: Patch, span: [f64; 2]) -> Result<Option<Crossing>> {
@@ -332,7 +335,11 @@ impl Caster<'_> {
                     behind.home = behind.home.or(before);
                 }
                 behind.side(Side::of(first), piece.span[0]);
-                let share = if first == last { 0.0 } else { (first / (first - last)).clamp(0.0, 1.0) };
+                let share = if first == last {
+                    0.0
+                } else {
+                    (first / (first - last)).clamp(0.0, 1.0)
+                };
                 behind.side(carried, piece.span[0] + (piece.span[1] - piece.span[0]) * share);
                 return None;
             }
