@@ -46,6 +46,8 @@ pub struct FrameStats {
     pub complete: bool,
     /// Whether the coarsest level's window ended before the DEM did.
     pub cut: bool,
+    /// Pixels that see through the drawn surface; null unless measured.
+    pub cracks: Option<u64>,
 }
 
 /// Median and 99th percentile of one quantity over a run, by [`percentile`].
@@ -192,6 +194,7 @@ mod tests {
             upload_bytes_exposed: 800,
             complete: true,
             cut: false,
+            cracks: None,
         }
     }
 
@@ -224,9 +227,12 @@ mod tests {
         let json = serde_json::to_string(&frame(3)).unwrap();
         let names: Vec<&str> = json.split('"').skip(1).step_by(2).collect();
         let documented = "frame t_s eye plan_ms upload_ms draw_ms gpu_ms frame_ms triangles draw_calls patches \
-            patches_culled levels_drawn uploads upload_bytes upload_bytes_exposed complete cut";
+            patches_culled levels_drawn uploads upload_bytes upload_bytes_exposed complete cut cracks";
         assert_eq!(names, documented.split_whitespace().collect::<Vec<_>>());
-        assert!(json.contains("\"gpu_ms\":null"), "{json}");
+        assert!(
+            json.contains("\"gpu_ms\":null") && json.contains("\"cracks\":null"),
+            "{json}"
+        );
         assert_eq!(serde_json::from_str::<FrameStats>(&json).unwrap(), frame(3));
     }
 

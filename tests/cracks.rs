@@ -27,6 +27,7 @@ use clipscape::light::Sun;
 use clipscape::progress::Silent;
 use clipscape::pyramid::{Filter, Pyramid};
 use clipscape::query::{S0, Surface};
+use clipscape::render::{Headless, HeadlessOptions};
 use clipscape::shade::ViewMode;
 use clipscape::stream::Terrain;
 use glam::DVec3;
@@ -78,7 +79,7 @@ fn camera(random: &mut Random, truth: &S0<'_>) -> Camera {
         eye: DVec3::new(x, ground + above, z),
         heading_deg: random.uniform(0.0, 360.0),
         pitch_deg: random.uniform(-90.0, 10.0),
-        roll_deg: random.uniform(-180.0, 180.0) * f64::from(u8::from(random.bits() % 4 == 0)),
+        roll_deg: random.uniform(-180.0, 180.0) * random.pick(&[0.0, 0.0, 0.0, 1.0]),
         fov_deg: random.uniform(20.0, 100.0),
     }
 }
@@ -318,4 +319,31 @@ fn control_without_the_morph_cracks_are_found() {
         seen.cracked.len() > 3 && seen.cracks > 50,
         "seed {seed}: {seen:?}"
     );
+}
+
+#[test]
+fn headless_frames_count_their_cracks_where_they_are_measured() {
+    let Some(gpu) = gpu() else { return };
+    let terrain = white_noise(true);
+    let mut random = Random(seed(36));
+    let camera = camera(&mut random, &S0::new(&terrain));
+    for sample_count in [1, 4] {
+        let options = HeadlessOptions {
+            size_px: [96, 64],
+            sample_count,
+            view_mode: ViewMode::Shaded,
+            tint: true,
+            haze: true,
+            traced_light: true,
+            sun: Sun::default(),
+            clipmap: ClipmapOptions::default(),
+        };
+        let mut headless = Headless::new(gpu.clone(), &terrain, &options).unwrap();
+        let plain = headless.frame(&terrain, &camera).unwrap();
+        assert_eq!(plain.cracks, None);
+        headless.measure().unwrap();
+        let measured = headless.frame(&terrain, &camera).unwrap();
+        assert_eq!(measured.cracks, Some(0), "{sample_count} samples a pixel");
+        assert!(plain.rgba8 == measured.rgba8, "measuring changes no picture");
+    }
 }

@@ -184,5 +184,6 @@ fn frame_stats(frame: &Frame, k: u64, t_s: f64, camera: &Camera) -> FrameStats {
         upload_bytes_exposed: frame.update.upload_bytes_exposed,
         complete: frame.update.complete,
         cut: frame.update.cut,
+        cracks: frame.cracks,
     }
 }
