@@ -16,7 +16,10 @@
 //!   1/128 pixel;
 //! - by what is behind: where the grid moves the silhouette of one hill away from that of another behind it, a pixel
 //!   sees between them what no ray sees. So it is a crack only if some distance, nearer than the depth that was drawn,
-//!   lies behind the surface on all the rays: then one sheet of ground covers them all.
+//!   lies behind the surface on all the rays: then one sheet of ground covers them all;
+//! - by what lies before that sheet: a triangle seen almost edge on may hide behind the nearer ones on every ray, and
+//!   still be drawn where the grid bares it, at a depth that its plane takes a little beside it. So what was drawn must
+//!   lie behind all that the rays meet before the sheet, one hit after another.
 
 use super::{DepthImage, Facet};
 use crate::clipmap::{Drawn, Eye, near_m};
@@ -32,6 +35,9 @@ const FIVE: [[f64; 2]; 5] = [[0.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [
 
 /// Pixels from a pixel's centre to the rings of the second look.
 const RINGS_PX: [f64; 2] = [1.0 / 512.0, 1.0 / 256.0];
+
+/// The share of a distance by which a ray goes on from one hit to look for the next: far more than its rounding.
+const STEP: f64 = 1e-9;
 
 /// The pixels of `image`, column and row, that are cracks in `drawn`, row by row.
 ///
@@ -94,11 +100,11 @@ impl Pixel<'_, '_> {
         };
         let rings = RINGS_PX.into_iter().flat_map(ring);
         let mut rays: Vec<_> = rings.map(|[east, south]| self.beside(east, south)).collect();
-        if !self.all_lie_before(&rays)? {
-            return Ok(false);
-        }
         rays.extend(five);
-        self.one_sheet_covers(&rays)
+        match self.sheet_m(&rays)? {
+            None => Ok(false),
+            Some(sheet_m) => self.all_lie_before_until(&rays, sheet_m),
+        }
     }
 
     fn beside(&self, east: f64, south: f64) -> [f64; 2] {
@@ -130,8 +136,8 @@ impl Pixel<'_, '_> {
         }
     }
 
-    /// Whether some distance before what was drawn is behind the surface on all rays.
-    fn one_sheet_covers(&mut self, rays: &[[f64; 2]]) -> Result<bool> {
+    /// Where the surface begins to be before all rays at once, nearer than what was drawn; none where it never is.
+    fn sheet_m(&mut self, rays: &[[f64; 2]]) -> Result<Option<f64>> {
         let end_m = near_m(self.drawn.grid()) / self.depth; // infinite where nothing was drawn
         let mut common = vec![[0.0, end_m]];
         for &ray in rays {
@@ -142,6 +148,24 @@ impl Pixel<'_, '_> {
                 .filter(|span| span[0] < span[1])
                 .collect();
         }
-        Ok(!common.is_empty())
+        Ok(common.first().map(|span| span[0]))
+    }
+
+    /// Whether all that the rays hit up to a distance lies before what was drawn.
+    fn all_lie_before_until(&mut self, rays: &[[f64; 2]], end_m: f64) -> Result<bool> {
+        for &ray in rays {
+            let mut start_m = near_m(self.drawn.grid());
+            while let Some(hit) = self
+                .picker
+                .cast_from(ray, start_m)?
+                .filter(|hit| hit.along <= end_m)
+            {
+                if !self.lies_before(&hit) {
+                    return Ok(false);
+                }
+                start_m = hit.along * (1.0 + STEP);
+            }
+        }
+        Ok(true)
     }
 }
