@@ -7,14 +7,16 @@
 //!
 //! What f32 and the grid explain is [`Facet::rounding`]. A pixel is drawn at its centre, not where a ray beside it is:
 //! what such a ray has hit is compared at the centre, by the plane of its triangle. Else a pixel beside a silhouette
-//! would count where the one ray that passes it meets a slope that comes nearer on its way of 1/128 pixel.
+//! would count where the one ray that passes it meets a slope that comes nearer on its way of 1/128 pixel. What f32 may
+//! move before the near plane explains anything.
 //!
-//! *Second look.* Five rays may miss what the rasteriser's grid lets a pixel see within 1/512 pixel of its centre, on
-//! rough ground about once in 50 pictures of 128 x 128. A pixel that they call a crack is looked at again:
+//! *Second look.* Five rays may miss what rounding lets a pixel see within 1/512 pixel of its centre, on rough ground
+//! about once in 50 pictures of 128 x 128; and of a triangle that is far larger than its distance from the eye, f32
+//! moves more than 1/128 pixel. A pixel that five rays call a crack is looked at again:
 //!
-//! - by 16 rays more, on two rings between centre and sides: strips of a triangle, and gaps, may be narrower than
-//!   1/128 pixel;
-//! - by what is behind: where the grid moves the silhouette of one hill away from that of another behind it, a pixel
+//! - by more rays, on two rings between centre and sides, for strips of a triangle and gaps that are narrower than
+//!   1/128 pixel, and on a third one, as far out as rounding moves what the five have hit;
+//! - by what is behind: where rounding moves the silhouette of one hill away from that of another behind it, a pixel
 //!   sees between them what no ray sees. So it is a crack only if some distance, nearer than the depth that was drawn,
 //!   lies behind the surface on all the rays: then one sheet of ground covers them all;
 //! - by what lies before that sheet: a triangle seen almost edge on may hide behind the nearer ones on every ray, and
@@ -89,8 +91,13 @@ struct Pixel<'a, 'p> {
 impl Pixel<'_, '_> {
     fn is_crack(&mut self) -> Result<bool> {
         let five = FIVE.map(|[east, south]| self.beside(east * BESIDE_PX, south * BESIDE_PX));
-        if !self.all_lie_before(&five)? {
-            return Ok(false);
+        let mut moved_px = 0.0f64;
+        for ray in five {
+            let hit = self.picker.cast(ray)?;
+            match hit.and_then(|hit| self.before(&hit)) {
+                None => return Ok(false),
+                Some(facet) => moved_px = moved_px.max(facet.place_rounding_px),
+            }
         }
         let ring = |radius: f64| {
             (0..8).map(move |k| {
@@ -98,12 +105,14 @@ impl Pixel<'_, '_> {
                 [radius * turn.cos(), radius * turn.sin()]
             })
         };
-        let rings = RINGS_PX.into_iter().flat_map(ring);
+        let [inner, outer] = RINGS_PX;
+        let farthest = outer.max(moved_px * std::f64::consts::SQRT_2);
+        let rings = [inner, outer, farthest].into_iter().flat_map(ring);
         let mut rays: Vec<_> = rings.map(|[east, south]| self.beside(east, south)).collect();
         rays.extend(five);
         match self.sheet_m(&rays)? {
             None => Ok(false),
-            Some(sheet_m) => self.all_lie_before_until(&rays, sheet_m),
+            Some(sheet_m) => self.all_lie_before(&rays, sheet_m),
         }
     }
 
@@ -111,29 +120,23 @@ impl Pixel<'_, '_> {
         [self.centre[0] + east, self.centre[1] + south]
     }
 
-    /// Whether all rays hit something before what was drawn.
-    fn all_lie_before(&mut self, rays: &[[f64; 2]]) -> Result<bool> {
-        for &ray in rays {
-            let hit = self.picker.cast(ray)?;
-            if !hit.is_some_and(|hit| self.lies_before(&hit)) {
-                return Ok(false);
-            }
-        }
-        Ok(true)
-    }
-
-    fn lies_before(&self, hit: &Crossing) -> bool {
-        let grid = self.drawn.grid();
+    /// The triangle that was hit, if it lies before what was drawn.
+    fn before(&self, hit: &Crossing) -> Option<Facet> {
+        let (grid, view) = (self.drawn.grid(), self.image.view());
         let hit_depth = near_m(grid) / hit.along;
         if self.depth >= hit_depth {
-            return false;
+            return None;
         }
-        let scale = self.drawn.clipmap().vertical_scale();
-        match Facet::new(grid, self.image.view(), scale, hit, self.centre) {
-            // Seen exactly edge on, a triangle has any depth.
-            None => false,
-            Some(facet) => self.depth < facet.depth.min(hit_depth) - facet.rounding(),
-        }
+        // Seen exactly edge on, a triangle has any depth.
+        let facet = Facet::new(
+            grid,
+            view,
+            self.drawn.clipmap().vertical_scale(),
+            hit,
+            self.centre,
+        )?;
+        let drawable = hit.along - facet.vertex_rounding_m > near_m(grid);
+        (drawable && self.depth < facet.depth.min(hit_depth) - facet.rounding()).then_some(facet)
     }
 
     /// Where the surface begins to be before all rays at once, nearer than what was drawn; none where it never is.
@@ -152,7 +155,7 @@ impl Pixel<'_, '_> {
     }
 
     /// Whether all that the rays hit up to a distance lies before what was drawn.
-    fn all_lie_before_until(&mut self, rays: &[[f64; 2]], end_m: f64) -> Result<bool> {
+    fn all_lie_before(&mut self, rays: &[[f64; 2]], end_m: f64) -> Result<bool> {
         for &ray in rays {
             let mut start_m = near_m(self.drawn.grid());
             while let Some(hit) = self
@@ -160,7 +163,7 @@ impl Pixel<'_, '_> {
                 .cast_from(ray, start_m)?
                 .filter(|hit| hit.along <= end_m)
             {
-                if !self.lies_before(&hit) {
+                if self.before(&hit).is_none() {
                     return Ok(false);
                 }
                 start_m = hit.along * (1.0 + STEP);

@@ -47,6 +47,8 @@ pub struct Facet {
     pub depth: f64,
     /// How it changes per pixel to the east and to the south.
     pub gradient: [f64; 2],
+    /// How far the device's vertices may be off, in metres.
+    pub vertex_rounding_m: f64,
     /// How far a device's depth may be off at one place, whatever the gradient.
     pub depth_rounding: f64,
     /// By how many pixels a device's place on the screen may be off, along each axis.
@@ -110,6 +112,7 @@ impl Facet {
         Some(Self {
             depth: depth_along(ray),
             gradient: [depth_along(east), depth_along(south)],
+            vertex_rounding_m: moved_m,
             depth_rounding: near_m / w * (moved_m / w)
                 + ROUNDING * seen.depths[1]
                 + seen.interpolation(2.0 * half_size_px),
