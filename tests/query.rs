@@ -1,25 +1,21 @@
-//! Queries on the DEM's own surface and on the drawn one: closed forms, a brute-force oracle, and the device's depths.
+//! Queries on the DEM's own surface and on the drawn one: closed forms, and brute force over all
+//! triangles.
 
 mod support;
+#[path = "support/surfaces.rs"]
+mod surfaces;
 
 use clipscape::camera::{Camera, View};
-use clipscape::clipmap::{Clipmap, ClipmapOptions, Drawn, displace};
+use clipscape::clipmap::{Clipmap, ClipmapOptions, Drawn};
 use clipscape::error::{Error, ErrorKind};
-use clipscape::grid::{Grid, PATCH, Rect};
+use clipscape::grid::{Grid, Rect};
 use clipscape::levels::{Arrival, Bounds, Levels, LightSample};
-use clipscape::progress::Silent;
-use clipscape::pyramid::{Filter, Pyramid};
+use clipscape::pyramid::Pyramid;
 use clipscape::query::{S0, Surface, collider};
-use clipscape::work::{Serial, Work};
+use clipscape::work::Work;
 use glam::DVec3;
-use support::{Formula, Random, hash, hills, seed};
-
-fn pyramid(grid: Grid, height: impl Fn(i64, i64) -> f32) -> Pyramid {
-    let heights = grid.size.rect().cells().map(|(i, j)| height(i, j)).collect();
-    let mut pyramid = Pyramid::new(grid, heights, None, &Filter::default(), &Serial, &Silent).unwrap();
-    pyramid.bound(&Serial, &Silent).unwrap();
-    pyramid
-}
+use support::{Formula, Random, hills, seed};
+use surfaces::{Diagonal, Oracle, pyramid, rough, rough_grid, small};
 
 fn camera(eye: DVec3) -> Camera {
     Camera {
@@ -37,130 +33,6 @@ fn clipmap(levels: &dyn Levels, eye: DVec3, options: &ClipmapOptions) -> Clipmap
         .update(levels, &View::new(camera(eye), [64, 64]).unwrap())
         .unwrap();
     clipmap
-}
-
-fn small(clip_size: i64) -> ClipmapOptions {
-    ClipmapOptions {
-        clip_size,
-        cull: false,
-        ..Default::default()
-    }
-}
-
-/// A triangle in world metres.
-type Corners = [DVec3; 3];
-
-/// Which way the quads of an oracle are split.
-#[derive(Clone, Copy, PartialEq)]
-enum Diagonal {
-    NorthWest,
-    /// The wrong one.
-    NorthEast,
-}
-
-/// All triangles of a surface, cut at the DEM's edge, for brute force.
-struct Oracle {
-    triangles: Vec<Corners>,
-    edge_m: [f64; 2],
-}
-
-impl Oracle {
-    fn new(grid: &Grid) -> Self {
-        Self {
-            triangles: Vec::new(),
-            edge_m: [
-                (grid.size.width - 1) as f64 * grid.spacing_m[0],
-                (grid.size.height - 1) as f64 * grid.spacing_m[1],
-            ],
-        }
-    }
-
-    fn push([nw, ne, sw, se]: [DVec3; 4], diagonal: Diagonal, into: &mut Vec<Corners>) {
-        let both = match diagonal {
-            Diagonal::NorthWest => [[nw, sw, se], [nw, se, ne]],
-            Diagonal::NorthEast => [[nw, sw, ne], [ne, sw, se]],
-        };
-        into.extend(both.iter().filter(|t| t.iter().all(|p| p.is_finite())));
-    }
-
-    fn truth(pyramid: &Pyramid, diagonal: Diagonal) -> Self {
-        let grid = pyramid.grid();
-        let mut oracle = Self::new(grid);
-        let point = |i: i64, j: i64| {
-            let height = pyramid.level(0)[(j * grid.size.width + i) as usize];
-            DVec3::new(
-                i as f64 * grid.spacing_m[0],
-                f64::from(height) + grid.base_m,
-                j as f64 * grid.spacing_m[1],
-            )
-        };
-        let cells = Rect::new(0, 0, grid.size.width - 1, grid.size.height - 1);
-        for (i, j) in cells.cells() {
-            let quad = [point(i, j), point(i + 1, j), point(i, j + 1), point(i + 1, j + 1)];
-            Self::push(quad, diagonal, &mut oracle.triangles);
-        }
-        oracle
-    }
-
-    /// Of the selection itself and its displaced vertices: not by [`Drawn`]'s walk.
-    fn drawn(clipmap: &Clipmap, diagonal: Diagonal) -> Self {
-        let grid = clipmap.grid();
-        let mut oracle = Self::new(grid);
-        for instance in clipmap.selection().instances() {
-            let last = grid.level(instance.level);
-            let point = |x: i32, z: i32| {
-                let vertex = displace(clipmap, instance, x, z);
-                let i = i64::from(instance.origin[0] + x).min(last.width - 1) << instance.level;
-                let j = i64::from(instance.origin[1] + z).min(last.height - 1) << instance.level;
-                let height = if vertex.void {
-                    f64::NAN
-                } else {
-                    f64::from(vertex.height)
-                };
-                DVec3::new(
-                    i as f64 * grid.spacing_m[0],
-                    height + grid.base_m,
-                    j as f64 * grid.spacing_m[1],
-                )
-            };
-            for z in 0..PATCH as i32 {
-                for x in 0..PATCH as i32 {
-                    let quad = [point(x, z), point(x + 1, z), point(x, z + 1), point(x + 1, z + 1)];
-                    Self::push(quad, diagonal, &mut oracle.triangles);
-                }
-            }
-        }
-        oracle
-    }
-
-    /// The first hits in multiples of `direction`, by triangles that are a little too large and a little too small.
-    fn ray(&self, origin: DVec3, direction: DVec3) -> [f64; 2] {
-        let mut first = [f64::INFINITY; 2];
-        for [a, b, c] in &self.triangles {
-            let (u, v) = (*b - *a, *c - *a);
-            let normal = u.cross(v);
-            let towards = normal.dot(direction);
-            if normal.y == 0.0 || towards == 0.0 {
-                continue; // no area on the ground, or seen edge on
-            }
-            let t = normal.dot(*a - origin) / towards;
-            // Its place on the ground.
-            let p = DVec3::new(origin.x - a.x, 0.0, origin.z - a.z)
-                + DVec3::new(direction.x, 0.0, direction.z) * t;
-            let area = u.x * v.z - u.z * v.x;
-            let weights = [(p.x * v.z - p.z * v.x) / area, (u.x * p.z - u.z * p.x) / area];
-            let inside = weights[0].min(weights[1]).min(1.0 - weights[0] - weights[1]);
-            let place = DVec3::new(a.x + p.x, 0.0, a.z + p.z);
-            let over = ((place.x - self.edge_m[0]) / self.edge_m[0])
-                .max((place.z - self.edge_m[1]) / self.edge_m[1]);
-            for (first, slack) in first.iter_mut().zip([1e-9, -1e-9]) {
-                if t >= -slack && inside >= -slack && over <= slack {
-                    *first = first.min(t);
-                }
-            }
-        }
-        first
-    }
 }
 
 /// A random ray about a DEM: from above, below, within its heights, or far away.
@@ -224,21 +96,6 @@ fn disagreements(
         }
     }
     (wrong, hits)
-}
-
-fn rough(i: i64, j: i64) -> f32 {
-    let void = hash(7, i / 9, j / 7) < 0.06 || hash(8, i, j) < 0.01;
-    if void {
-        f32::NAN
-    } else {
-        hills(0, i, j) + 40.0 * hash(0, i, j) as f32
-    }
-}
-
-fn rough_grid() -> Grid {
-    let mut grid = Grid::new(150, 119, [3.0, 5.0]);
-    grid.base_m = 1000.25;
-    grid
 }
 
 #[test]
@@ -685,165 +542,4 @@ fn colliders_hold_the_level_s_samples() {
     let large = Formula::new(Grid::new(1 << 20, 1 << 20, [1.0, 1.0]), hills);
     let all = large.grid.size.rect();
     assert_eq!(collider(&large, 0, all).unwrap_err().kind(), ErrorKind::Limit);
-}
-
-/// Against the device: needs an adapter.
-#[cfg(feature = "gpu")]
-mod drawn_depths {
-    use super::*;
-    use clipscape::accuracy::{Facet, RASTER_PX};
-    use clipscape::clipmap::near_m;
-    use clipscape::light::Sun;
-    use clipscape::query::Picker;
-    use clipscape::render::{Headless, HeadlessOptions};
-    use clipscape::shade::ViewMode;
-
-    const SIZE_PX: [u32; 2] = [96, 80];
-
-    fn headless(gpu: clipscape::gpu::Gpu, levels: &dyn Levels, vertical_scale: f64) -> Headless {
-        let options = HeadlessOptions {
-            size_px: SIZE_PX,
-            sample_count: 1,
-            view_mode: ViewMode::Shaded,
-            tint: false,
-            haze: false,
-            traced_light: false,
-            sun: Sun::default(),
-            clipmap: ClipmapOptions {
-                vertical_scale,
-                ..small(64)
-            },
-        };
-        Headless::new(gpu, levels, &options).unwrap()
-    }
-
-    fn random_camera(random: &mut Random, grid: &Grid, ground_m: f64) -> Camera {
-        let side = |axis: usize, samples: i64| grid.spacing_m[axis] * samples as f64;
-        Camera {
-            eye: DVec3::new(
-                random.uniform(0.1, 0.9) * side(0, grid.size.width),
-                ground_m + random.uniform(60.0, 700.0),
-                random.uniform(0.1, 0.9) * side(1, grid.size.height),
-            ),
-            heading_deg: random.uniform(0.0, 360.0),
-            pitch_deg: random.uniform(-80.0, -15.0),
-            roll_deg: random.uniform(-10.0, 10.0),
-            fov_deg: random.uniform(30.0, 80.0),
-        }
-    }
-
-    /// How far on the screen, in pixels, a drawn depth lies from the surface about a pixel's centre, less what f32
-    /// explains: the least over the planes that rays within 1/256 pixel of it meet, or meet next: beside a silhouette
-    /// what was drawn may lie just behind it.
-    fn off_px(
-        picker: &mut Picker<'_, Drawn<'_>>,
-        drawn: &Drawn<'_>,
-        view: &View,
-        depth: f64,
-        centre: [f64; 2],
-    ) -> f64 {
-        let (grid, scale) = (drawn.clipmap().grid(), drawn.clipmap().vertical_scale());
-        let mut least = f64::INFINITY;
-        for (radius, hits) in [(0.0, 1), (1.0 / 512.0, 3), (1.0 / 256.0, 3)] {
-            for k in 0..8 {
-                let turn = f64::from(k) * std::f64::consts::FRAC_PI_4;
-                let ray = [centre[0] + radius * turn.cos(), centre[1] + radius * turn.sin()];
-                let mut start_m = near_m(grid);
-                for _ in 0..hits {
-                    let Some(hit) = picker.cast_from(ray, start_m).unwrap() else {
-                        break;
-                    };
-                    start_m = hit.along * (1.0 + 1e-9);
-                    let off = Facet::new(grid, view, scale, &hit, centre).map_or(0.0, |f| {
-                        let beside = ((depth - f.depth).abs() - f.depth_rounding).max(0.0);
-                        let place = beside / f.gradient[0].hypot(f.gradient[1]);
-                        (place - (f.place_rounding_px - RASTER_PX)).max(0.0)
-                    });
-                    least = least.min(off);
-                }
-            }
-            if least <= 1.0 / 256.0 {
-                break;
-            }
-        }
-        least
-    }
-
-    #[test]
-    fn drawn_points_lie_on_the_queried_surface() {
-        let Some(gpu) = support::gpu() else { return };
-        let seed = seed(26);
-        let mut random = Random(seed);
-        let (mut pixels, mut rims, mut worst) = (0, 0, 0.0f64);
-        let (mut checked, mut right, mut wrong) = (0, 0, 0);
-        let mut grid = Grid::new(400, 330, [3.0, 5.0]);
-        grid.base_m = 1000.25;
-        let terrains = [pyramid(grid, rough), pyramid(grid, |i, j| hills(0, i, j))];
-        for k in 0..8 {
-            let pyramid = &terrains[k % 2];
-            let scale = random.pick(&[1.0, 1.0, 2.0, -1.0]);
-            let mut headless = headless(gpu.clone(), pyramid, scale);
-            let mut camera = random_camera(&mut random, &grid, 1200.0);
-            if scale < 0.0 {
-                camera.eye.y = 2000.0 - camera.eye.y; // heights are turned over about the eye
-            }
-            headless.frame(pyramid, &camera).unwrap();
-            let depths = headless.read_depth().unwrap();
-            let view = View::new(camera, SIZE_PX).unwrap();
-            let drawn = Drawn::new(headless.clipmap()).unwrap();
-            let mut picker = Picker::new(&drawn, &view).unwrap();
-            let oracles =
-                [Diagonal::NorthWest, Diagonal::NorthEast].map(|d| Oracle::drawn(headless.clipmap(), d));
-            for (n, depth) in depths.iter().map(|d| f64::from(*d)).enumerate() {
-                let [x, y] = [n % SIZE_PX[0] as usize, n / SIZE_PX[0] as usize].map(|v| v as f64 + 0.5);
-                if depth == 0.0 {
-                    continue;
-                }
-                let off = off_px(&mut picker, &drawn, &view, depth, [x, y]);
-                // Within the rasteriser's grid of the rim of a hole, its own triangle is level enough with it to be
-                // drawn, by a plane that the surface does not have.
-                if off > 1.0 / 256.0 && k % 2 == 0 {
-                    rims += 1;
-                    continue;
-                }
-                assert!(
-                    off <= 1.0 / 256.0,
-                    "seed {seed}, frame {k} {camera:?}, pixel {x}, {y}: {} / 256 pixel off",
-                    off * 256.0
-                );
-                pixels += 1;
-                worst = worst.max(off);
-                // Control: by brute force, on the surface with either diagonal, here and there.
-                let Some(hit) = picker.cast([x, y]).unwrap() else {
-                    continue;
-                };
-                if n % 97 != 0 || scale != 1.0 {
-                    continue;
-                }
-                let Some(facet) = Facet::new(&grid, &view, scale, &hit, [x, y]) else {
-                    continue;
-                };
-                let slack = facet.depth_rounding + facet.gradient[0].hypot(facet.gradient[1]) / 256.0;
-                let differs = |oracle: &Oracle| {
-                    let along = oracle.ray(camera.eye, view.ray([x, y]))[0];
-                    (near_m(&grid) / along - depth).abs() > slack
-                };
-                checked += 1;
-                right += u32::from(!differs(&oracles[0]));
-                wrong += u32::from(differs(&oracles[1]));
-            }
-        }
-        assert!(pixels > 10_000, "seed {seed}: {pixels} pixels");
-        assert!(rims * 1000 < pixels, "seed {seed}: {rims} at rims of {pixels}");
-        assert!(worst > 0.0, "seed {seed}: nothing was ever off");
-        // At silhouettes the centre alone may see another hill than was drawn.
-        assert!(
-            right * 50 >= checked * 49,
-            "seed {seed}: {right} of {checked} right"
-        );
-        assert!(
-            wrong * 2 > checked,
-            "seed {seed}: the other diagonal differs in {wrong} of {checked}"
-        );
-    }
 }

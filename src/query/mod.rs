@@ -14,6 +14,7 @@
 mod collider;
 mod drawn;
 mod ground;
+mod line;
 mod quad;
 pub mod ray;
 mod s0;
@@ -29,7 +30,7 @@ use crate::camera::View;
 use crate::clipmap::{Corners, Eye, Place, near_m};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Patch, Rect};
-use ray::Line;
+use line::Line;
 
 /// A surface made of patches, which can be asked for heights, normals and rays, by several threads at once.
 pub trait Surface: Sync {
