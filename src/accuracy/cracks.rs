@@ -21,7 +21,8 @@
 //!   lies behind the surface on all the rays: then one sheet of ground covers them all;
 //! - by what lies before that sheet: a triangle seen almost edge on may hide behind the nearer ones on every ray, and
 //!   still be drawn where the grid bares it, at a depth that its plane takes a little beside it. So what was drawn must
-//!   lie behind all that the rays meet before the sheet, one hit after another.
+//!   lie behind all that the rays meet before the sheet, one hit after another. Such a triangle may be narrower than
+//!   any ring: it is looked for by halving the way between two rays that hit different triangles.
 
 use super::{DepthImage, Facet};
 use crate::clipmap::{Drawn, Eye, near_m};
@@ -38,8 +39,15 @@ const FIVE: [[f64; 2]; 5] = [[0.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [
 /// Pixels from a pixel's centre to the rings of the second look.
 const RINGS_PX: [f64; 2] = [1.0 / 512.0, 1.0 / 256.0];
 
-/// The share of a distance by which a ray goes on from one hit to look for the next: far more than its rounding.
-const STEP: f64 = 1e-9;
+/// Halvings of the way between two rays: from 1/256 pixel to the 2^-32nd of one.
+const HALVINGS: usize = 24;
+
+/// The share of a distance by which a ray goes on from one hit to look for the next: more than its rounding, less
+/// than what lies between two triangles at the end of the halvings.
+const STEP: f64 = 1e-12;
+
+/// The most hits of a ray that are looked at: rounding may find one twice.
+const MOST_HITS: usize = 64;
 
 /// The pixels of `image`, column and row, that are cracks in `drawn`, row by row.
 ///
@@ -112,8 +120,39 @@ impl Pixel<'_, '_> {
         rays.extend(five);
         match self.sheet_m(&rays)? {
             None => Ok(false),
-            Some(sheet_m) => self.all_lie_before(&rays, sheet_m),
+            Some(sheet_m) => {
+                let edges = self.edges(&rays)?;
+                Ok(self.all_lie_before(&rays, sheet_m)? && self.all_lie_before(&edges, sheet_m)?)
+            }
         }
+    }
+
+    /// Rays on both sides of, and as near as f64 allows to, the edges of the triangles that the centre and others hit.
+    fn edges(&mut self, rays: &[[f64; 2]]) -> Result<Vec<[f64; 2]>> {
+        let mut edges = Vec::new();
+        let hit_at = |picker: &mut Picker<'_, _>, ray| -> Result<_> {
+            Ok(picker.cast(ray)?.map(|hit| (hit.level, hit.cell, hit.triangle)))
+        };
+        let at_centre = hit_at(self.picker, self.centre)?;
+        for &ray in rays {
+            let at_ray = hit_at(self.picker, ray)?;
+            if at_ray == at_centre {
+                continue;
+            }
+            for (from, at_from, to) in [(self.centre, at_centre, ray), (ray, at_ray, self.centre)] {
+                let (mut inside, mut outside) = (from, to);
+                for _ in 0..HALVINGS {
+                    let middle = [0, 1].map(|k| (inside[k] + outside[k]) / 2.0);
+                    if hit_at(self.picker, middle)? == at_from {
+                        inside = middle;
+                    } else {
+                        outside = middle;
+                    }
+                }
+                edges.extend([inside, outside]);
+            }
+        }
+        Ok(edges)
     }
 
     fn beside(&self, east: f64, south: f64) -> [f64; 2] {
@@ -158,11 +197,11 @@ impl Pixel<'_, '_> {
     fn all_lie_before(&mut self, rays: &[[f64; 2]], end_m: f64) -> Result<bool> {
         for &ray in rays {
             let mut start_m = near_m(self.drawn.grid());
-            while let Some(hit) = self
-                .picker
-                .cast_from(ray, start_m)?
-                .filter(|hit| hit.along <= end_m)
-            {
+            for _ in 0..MOST_HITS {
+                let hit = self.picker.cast_from(ray, start_m)?;
+                let Some(hit) = hit.filter(|hit| hit.along <= end_m) else {
+                    break;
+                };
                 if self.before(&hit).is_none() {
                     return Ok(false);
                 }
