@@ -318,6 +318,13 @@ fn a_crest_seen_along_its_line_is_no_crack() {
         cracks(&drawn, &image, &Threads::new(0).unwrap()).unwrap()
     };
     assert_eq!(count(&image), Vec::<[u32; 2]>::new());
+    let refused = DepthImage::new(&image[1..], &view).unwrap_err();
+    assert_eq!(refused.kind(), clipscape::ErrorKind::Misuse);
+    let mut elsewhere = view;
+    elsewhere.camera.eye.x += 1.0;
+    let elsewhere = DepthImage::new(&image, &elsewhere).unwrap();
+    let refused = cracks(&drawn, &elsewhere, &clipscape::work::Serial).unwrap_err();
+    assert_eq!(refused.kind(), clipscape::ErrorKind::Misuse);
     // Control: each pixel of terrain that is seen through is counted, but for those that silhouettes pass.
     let seen_through = count(&vec![0.0; image.len()]).len();
     let terrain = image.iter().filter(|d| **d > 0.0).count();

@@ -5,13 +5,14 @@ mod support;
 #[path = "support/surfaces.rs"]
 mod surfaces;
 
+use clipscape::accuracy::Facet;
 use clipscape::camera::{Camera, View};
-use clipscape::clipmap::{Clipmap, ClipmapOptions, Drawn};
+use clipscape::clipmap::{Clipmap, ClipmapOptions, Drawn, Place, near_m};
 use clipscape::error::{Error, ErrorKind};
-use clipscape::grid::{Grid, Rect};
+use clipscape::grid::{Grid, Patch, Rect};
 use clipscape::levels::{Arrival, Bounds, Levels, LightSample};
 use clipscape::pyramid::Pyramid;
-use clipscape::query::{S0, Surface, collider};
+use clipscape::query::{Picker, Reader, S0, Surface, collider};
 use clipscape::work::Work;
 use glam::DVec3;
 use support::{Formula, Random, hills, seed};
@@ -322,6 +323,133 @@ fn a_spike_and_a_cone_are_met_where_their_triangles_are() {
     }
 }
 
+/// Patches in a row, each level at its own height, with nothing between them; the height of a void one is NaN.
+struct Terraces {
+    grid: Grid,
+    heights: Vec<f32>,
+    /// Whether bounds are known.
+    bounded: bool,
+}
+
+impl Surface for Terraces {
+    fn grid(&self) -> &Grid {
+        &self.grid
+    }
+    fn vertical_scale(&self) -> f64 {
+        1.0
+    }
+    fn roots(&self) -> (u32, Rect) {
+        (0, self.grid.patches(0).rect())
+    }
+    fn reader(&self) -> Box<dyn Reader + '_> {
+        Box::new(TerraceReader(self, [0.0; 81]))
+    }
+}
+
+struct TerraceReader<'a>(&'a Terraces, clipscape::clipmap::Corners);
+
+impl Reader for TerraceReader<'_> {
+    fn place(&self, _: Patch) -> Place {
+        Place::Patch
+    }
+    fn heights(&mut self, patch: Patch) -> clipscape::Result<[f32; 2]> {
+        let height = self.0.heights[patch.a as usize];
+        Ok(if self.0.bounded {
+            [height; 2]
+        } else {
+            [f32::NAN; 2]
+        })
+    }
+    fn corners(&mut self, patch: Patch) -> clipscape::Result<&clipscape::clipmap::Corners> {
+        self.1 = [self.0.heights[patch.a as usize]; 81];
+        Ok(&self.1)
+    }
+}
+
+#[test]
+fn a_ray_slips_through_no_step_between_patches_but_through_holes() {
+    let terraces = |heights: &[f32], bounded| Terraces {
+        grid: Grid::new(8 * heights.len() as i64 + 1, 17, [1.0, 1.0]),
+        heights: heights.to_vec(),
+        bounded,
+    };
+    for bounded in [false, true] {
+        for (heights, want) in [
+            // The step may be as small as rounding makes it.
+            (&[0.0, 5.0, 9.0][..], Some(8.0)),
+            (&[2.0f32.next_down(), 2.0f32.next_up()], Some(8.0)),
+            (&[2.0, 0.0], Some(0.0)),
+            (&[0.0, 0.0, 5.0], Some(16.0)),
+            (&[5.0, 5.0, 0.0], Some(16.0)),
+            (&[0.0, 1.0, 0.0], None),
+            // Over a hole nothing is carried.
+            (&[0.0, f32::NAN, 5.0], None),
+            (&[0.0, f32::NAN, 5.0, 0.0], Some(24.0)),
+            (&[f32::NAN, 5.0, 5.0], None),
+        ] {
+            let surface = terraces(heights, bounded);
+            let hit = surface.ray(DVec3::new(-3.0, 2.0, 4.25), DVec3::X).unwrap();
+            assert_eq!(hit.map(|h| h.point.x), want, "{heights:?}, bounded: {bounded}");
+            // And back, through the other side.
+            let length = (8 * heights.len()) as f64;
+            let mut turned = surface;
+            turned.heights.reverse();
+            let back = turned
+                .ray(DVec3::new(length + 3.0, 2.0, 4.25), DVec3::NEG_X)
+                .unwrap();
+            assert_eq!(back.map(|h| length - h.point.x), want, "{heights:?} turned round");
+        }
+    }
+}
+
+#[test]
+fn facets_are_what_rays_meet_about_them() {
+    let pyramid = pyramid(rough_grid(), |i, j| hills(0, i, j));
+    let seed = seed(27);
+    let mut random = Random(seed);
+    let mut checked = 0;
+    for scale in [1.0, -3.0] {
+        let s0 = S0::new(&pyramid).with_vertical_scale(scale);
+        let grid = pyramid.grid();
+        for _ in 0..100 {
+            let eye = DVec3::new(
+                random.uniform(0.0, 400.0),
+                1000.0 + 260.0 * scale.signum(),
+                random.uniform(0.0, 500.0),
+            );
+            let camera = Camera {
+                pitch_deg: -60.0,
+                ..camera(eye)
+            };
+            let view = View::new(camera, [100, 80]).unwrap();
+            let mut picker = Picker::new(&s0, &view).unwrap();
+            let pixel = [random.uniform(0.0, 100.0), random.uniform(0.0, 80.0)];
+            let Some(hit) = picker.cast(pixel).unwrap() else {
+                continue;
+            };
+            let facet = Facet::new(grid, &view, scale, &hit, pixel).unwrap();
+            let near_m = near_m(grid);
+            assert!(
+                (facet.depth / (near_m / hit.along) - 1.0).abs() < 1e-9,
+                "seed {seed}"
+            );
+            // Beside it, as long as the same triangle is met, depth is linear.
+            let beside = [pixel[0] + 0.01, pixel[1] - 0.02];
+            let next = picker.cast(beside).unwrap();
+            if let Some(next) = next.filter(|n| (n.cell, n.triangle) == (hit.cell, hit.triangle)) {
+                let linear = facet.depth + 0.01 * facet.gradient[0] - 0.02 * facet.gradient[1];
+                assert!((linear / (near_m / next.along) - 1.0).abs() < 1e-9, "seed {seed}");
+                checked += 1;
+            }
+            assert!(
+                facet.rounding() > 0.0 && facet.rounding() < 0.1 * facet.depth,
+                "{facet:?}"
+            );
+        }
+    }
+    assert!(checked > 40, "seed {seed}: {checked}");
+}
+
 #[test]
 fn large_indices_cost_nothing() {
     let side = 1 << 30;
@@ -388,7 +516,7 @@ fn picks_heed_the_near_plane_and_the_vertical_scale() {
     assert_eq!(flat.pick(&view, [50.0, 70.0]).unwrap(), None);
     // An eye a hair above the ground, looking down: what is nearer than the near plane is not drawn.
     let ground = flat.height_at(200.0, 200.0).unwrap().unwrap();
-    let near_m = clipscape::clipmap::near_m(pyramid.grid());
+    let near_m = near_m(pyramid.grid());
     for (above, found) in [(0.5, false), (2.0, true)] {
         let mut camera = camera(DVec3::new(200.0, ground + above * near_m, 200.0));
         camera.pitch_deg = -90.0;
