@@ -19,7 +19,8 @@
 //!    products: with L the triangle's extent on the screen, A its area and D its range of depths, each product is at
 //!    most D L and off by 2^-24 of it, as the corners' places are by 2^-24 of L and the picture's size S; over 2 A,
 //!    and along L, that is `2^-24 D L (L + S) / (2 A)`, some 16 times. For a sliver that is much; and a device may cut
-//!    triangles that reach far over the picture's sides into slimmer ones. [`INTERPOLATION`] is 64 times 2^-24. It never exceeds D, the depths at the corners being what they are.
+//!    triangles that reach far over the picture's sides into slimmer ones. [`INTERPOLATION`] is 64 times 2^-24. The bound
+//!    never exceeds D, the depths at the corners being what they are.
 //!
 //! A rasteriser may take coverage from snapped corners and depth from the others: then what it draws at a pixel is the
 //! plane of a triangle that ends up to [`RASTER_PX`] beside it. So planes are compared at the pixel's centre.
