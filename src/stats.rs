@@ -50,6 +50,8 @@ pub struct FrameStats {
     pub stale_levels: u32,
     /// Patches whose detail vanished at once, because their data came too late to be taken back gently.
     pub pops: u64,
+    /// Pixels that see through the drawn surface; null unless measured.
+    pub cracks: Option<u64>,
 }
 
 /// Median and 99th percentile of one quantity over a run, by [`percentile`].
@@ -198,6 +200,7 @@ mod tests {
             cut: false,
             stale_levels: 0,
             pops: 0,
+            cracks: None,
         }
     }
 
@@ -230,9 +233,12 @@ mod tests {
         let json = serde_json::to_string(&frame(3)).unwrap();
         let names: Vec<&str> = json.split('"').skip(1).step_by(2).collect();
         let documented = "frame t_s eye plan_ms upload_ms draw_ms gpu_ms frame_ms triangles draw_calls patches \
-            patches_culled levels_drawn uploads upload_bytes upload_bytes_exposed complete cut stale_levels pops";
+            patches_culled levels_drawn uploads upload_bytes upload_bytes_exposed complete cut stale_levels pops cracks";
         assert_eq!(names, documented.split_whitespace().collect::<Vec<_>>());
-        assert!(json.contains("\"gpu_ms\":null"), "{json}");
+        assert!(
+            json.contains("\"gpu_ms\":null") && json.contains("\"cracks\":null"),
+            "{json}"
+        );
         assert_eq!(serde_json::from_str::<FrameStats>(&json).unwrap(), frame(3));
     }
 

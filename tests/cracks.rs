@@ -28,6 +28,7 @@ use clipscape::light::Sun;
 use clipscape::progress::Silent;
 use clipscape::pyramid::{Filter, Pyramid};
 use clipscape::query::{S0, Surface};
+use clipscape::render::{Headless, HeadlessOptions};
 use clipscape::shade::ViewMode;
 use clipscape::stream::Terrain;
 use glam::DVec3;
@@ -79,37 +80,72 @@ fn camera(random: &mut Random, truth: &S0<'_>) -> Camera {
         eye: DVec3::new(x, ground + above, z),
         heading_deg: random.uniform(0.0, 360.0),
         pitch_deg: random.uniform(-90.0, 10.0),
-        roll_deg: random.uniform(-180.0, 180.0) * f64::from(u8::from(random.bits().is_multiple_of(4))),
+        roll_deg: random.uniform(-180.0, 180.0) * random.pick(&[0.0, 0.0, 0.0, 1.0]),
         fov_deg: random.uniform(20.0, 100.0),
     }
 }
 
-fn options(random: &mut Random, broken: Broken) -> ClipmapOptions {
-    let clip_sizes: &[i64] = if broken == Broken::Order {
-        &[64]
-    } else {
-        &[64, 128, 256]
-    };
-    let clip_size = random.pick(clip_sizes);
+fn options(random: &mut Random) -> ClipmapOptions {
+    let clip_size = random.pick(&[64, 128, 256]);
     let limit = clip_size / 4 - 10;
-    let options = ClipmapOptions {
+    ClipmapOptions {
         clip_size,
         transition: Some(random.pick(&[0, 1, clip_size / 10, limit]).min(limit)),
         vertical_scale: random.pick(&[1.0, 1.0, 1.0, 0.0, -1.0, 3.0]),
-        wait: match broken {
-            Broken::Nothing => random.pick(&[Wait::All, Wait::None]),
-            Broken::Closers | Broken::Morph => Wait::All,
-            Broken::Order => Wait::None,
-        },
+        ..Default::default()
+    }
+}
+
+/// The same with frames that wait for their data, or fly to their place under too small a budget.
+fn any_scene(random: &mut Random, truth: &S0<'_>) -> (ClipmapOptions, Camera) {
+    let (options, camera) = any_scene_that_waits(random, truth);
+    if random.bits().is_multiple_of(2) {
+        return (options, camera);
+    }
+    let options = ClipmapOptions {
+        wait: Wait::None,
+        upload_budget_bytes: random.pick(&[Some(2_000), Some(20_000), Some(200_000), None]),
+        ..options
+    };
+    (options, camera)
+}
+
+/// Data that come late enough to be seen at a small clip size.
+fn late_scene(random: &mut Random, truth: &S0<'_>) -> (ClipmapOptions, Camera) {
+    let (options, camera) = any_scene_that_waits(random, truth);
+    let options = ClipmapOptions {
+        clip_size: 64,
+        transition: Some(random.pick(&[0, 1, 6])),
+        wait: Wait::None,
+        upload_budget_bytes: random.pick(&[Some(20_000), Some(200_000)]),
+        ..options
+    };
+    (options, camera)
+}
+
+fn any_scene_that_waits(random: &mut Random, truth: &S0<'_>) -> (ClipmapOptions, Camera) {
+    (options(random), camera(random, truth))
+}
+
+/// Looking down on the borders of several levels.
+fn borders(random: &mut Random, truth: &S0<'_>) -> (ClipmapOptions, Camera) {
+    let grid = truth.grid();
+    let side = |axis: usize, samples: i64| grid.spacing_m[axis] * (samples - 1) as f64;
+    let x = random.uniform(0.2, 0.8) * side(0, grid.size.width);
+    let z = random.uniform(0.2, 0.8) * side(1, grid.size.height);
+    let above = random.uniform(5.0, 15.0) * grid.spacing_m[1];
+    let camera = Camera {
+        eye: DVec3::new(x, truth.height_at(x, z).unwrap().unwrap_or(0.0) + above, z),
+        heading_deg: random.uniform(0.0, 360.0),
+        pitch_deg: random.uniform(-60.0, -30.0),
+        roll_deg: 0.0,
+        fov_deg: 100.0,
+    };
+    let options = ClipmapOptions {
+        clip_size: 64,
         ..Default::default()
     };
-    ClipmapOptions {
-        upload_budget_bytes: match options.wait {
-            Wait::All => None,
-            Wait::None => random.pick(&[Some(2_000), Some(20_000), Some(200_000), None]),
-        },
-        ..options
-    }
+    (options, camera)
 }
 
 /// Draws one clipmap after another into one picture's depth.
@@ -243,15 +279,21 @@ struct Seen {
     incomplete: u32,
 }
 
-fn look(levels: &dyn Levels, size_px: [u32; 2], cameras: u32, seed: u64, broken: Broken) -> Option<Seen> {
+fn look(
+    levels: &dyn Levels,
+    size_px: [u32; 2],
+    cameras: u32,
+    seed: u64,
+    scene: impl Fn(&mut Random, &S0<'_>) -> (ClipmapOptions, Camera),
+    broken: Broken,
+) -> Option<Seen> {
     let depths = Depths::new(gpu()?, size_px);
     let threads = Threads::new(0).unwrap();
     let truth = S0::new(levels);
     let mut random = Random(seed);
     let mut seen = Seen::default();
     for k in 0..cameras {
-        let options = options(&mut random, broken);
-        let camera = camera(&mut random, &truth);
+        let (options, camera) = scene(&mut random, &truth);
         let view = View::new(camera, size_px).unwrap();
         let clipmap = frame(levels, &options, &view, &mut random, broken);
         seen.incomplete += u32::from(!clipmap.report().complete);
@@ -276,7 +318,7 @@ fn look(levels: &dyn Levels, size_px: [u32; 2], cameras: u32, seed: u64, broken:
 fn expect_none(name: &str, levels: &dyn Levels, seed_default: u64) {
     let (seed, count) = (seed(seed_default), cameras());
     let started = std::time::Instant::now();
-    let Some(seen) = look(levels, [128, 128], count, seed, Broken::Nothing) else {
+    let Some(seen) = look(levels, [128, 128], count, seed, any_scene, Broken::Nothing) else {
         return;
     };
     eprintln!(
@@ -299,10 +341,14 @@ fn expect_none(name: &str, levels: &dyn Levels, seed_default: u64) {
     );
 }
 
+fn pyrenees() -> Terrain {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/N42E001.hgt");
+    Terrain::open(path, &Silent).unwrap()
+}
+
 #[test]
 fn the_shipped_dem_has_no_cracks() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/N42E001.hgt");
-    expect_none("Pyrenees", &Terrain::open(path, &Silent).unwrap(), 31);
+    expect_none("Pyrenees", &pyrenees(), 31);
 }
 
 #[test]
@@ -315,12 +361,57 @@ fn white_noise_with_voids_has_no_cracks() {
     expect_none("white noise with voids", &white_noise(true), 33);
 }
 
+/// Found among 2,000 cameras: over a crest that runs along the line of sight, the rasteriser's grid bares a triangle
+/// that is seen edge on, and draws it 4 % too far away. No ray sees it first, and it is no crack.
+#[test]
+fn a_crest_seen_along_its_line_is_no_crack() {
+    let Some(gpu) = gpu() else { return };
+    let terrain = pyrenees();
+    let options = ClipmapOptions {
+        clip_size: 128,
+        transition: Some(22),
+        vertical_scale: -1.0,
+        ..Default::default()
+    };
+    let camera = Camera {
+        eye: DVec3::new(
+            10_557.184_121_079_963,
+            2_818.500_422_326_235,
+            37_465.084_428_888_66,
+        ),
+        heading_deg: 259.712_420_500_042_75,
+        pitch_deg: -31.608_249_623_612_004,
+        roll_deg: 107.626_066_014_372_9,
+        fov_deg: 95.487_451_934_688_12,
+    };
+    let view = View::new(camera, [128, 128]).unwrap();
+    let mut clipmap = Clipmap::new(&terrain, &options).unwrap();
+    clipmap.update(&terrain, &view, 0.0).unwrap();
+    let image = Depths::new(gpu, view.size_px).draw(&clipmap);
+    let drawn = Drawn::new(&clipmap).unwrap();
+    let count = |image: &[f32]| {
+        let image = DepthImage::new(image, &view).unwrap();
+        cracks(&drawn, &image, &Threads::new(0).unwrap()).unwrap()
+    };
+    assert_eq!(count(&image), Vec::<[u32; 2]>::new());
+    let refused = DepthImage::new(&image[1..], &view).unwrap_err();
+    assert_eq!(refused.kind(), clipscape::ErrorKind::Misuse);
+    let mut elsewhere = view;
+    elsewhere.eye.x += 1.0;
+    let elsewhere = DepthImage::new(&image, &elsewhere).unwrap();
+    let refused = cracks(&drawn, &elsewhere, &clipscape::work::Serial).unwrap_err();
+    assert_eq!(refused.kind(), clipscape::ErrorKind::Misuse);
+    // Control: each pixel of terrain that is seen through is counted, but for those that silhouettes pass.
+    let seen_through = count(&vec![0.0; image.len()]).len();
+    let terrain = image.iter().filter(|d| **d > 0.0).count();
+    assert!(seen_through * 100 >= terrain * 99, "{seen_through} of {terrain}");
+}
+
 #[test]
 fn control_without_closing_triangles_cracks_are_found() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/N42E001.hgt");
-    let terrain = Terrain::open(path, &Silent).unwrap();
+    let terrain = pyrenees();
     let seed = seed(34);
-    let Some(seen) = look(&terrain, [512, 512], 60, seed, Broken::Closers) else {
+    let Some(seen) = look(&terrain, [512, 512], 30, seed, borders, Broken::Closers) else {
         return;
     };
     eprintln!("without closing triangles: {} cracks", seen.cracks);
@@ -329,10 +420,16 @@ fn control_without_closing_triangles_cracks_are_found() {
 
 #[test]
 fn control_without_the_morph_cracks_are_found() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/N42E001.hgt");
-    let terrain = Terrain::open(path, &Silent).unwrap();
+    let terrain = pyrenees();
     let seed = seed(35);
-    let Some(seen) = look(&terrain, [128, 128], 50, seed, Broken::Morph) else {
+    let Some(seen) = look(
+        &terrain,
+        [128, 128],
+        50,
+        seed,
+        any_scene_that_waits,
+        Broken::Morph,
+    ) else {
         return;
     };
     eprintln!(
@@ -341,7 +438,7 @@ fn control_without_the_morph_cracks_are_found() {
         seen.cracked.len()
     );
     assert!(
-        seen.cracked.len() > 5 && seen.cracks > 50,
+        seen.cracked.len() > 3 && seen.cracks > 50,
         "seed {seed}: {seen:?}"
     );
 }
@@ -349,8 +446,8 @@ fn control_without_the_morph_cracks_are_found() {
 #[test]
 fn control_without_the_fade_s_order_cracks_are_found() {
     let noise = white_noise(false);
-    let seed = seed(36);
-    let Some(seen) = look(&noise, [128, 128], 100, seed, Broken::Order) else {
+    let seed = seed(37);
+    let Some(seen) = look(&noise, [128, 128], 100, seed, late_scene, Broken::Order) else {
         return;
     };
     eprintln!(
@@ -358,5 +455,32 @@ fn control_without_the_fade_s_order_cracks_are_found() {
         seen.cracks,
         seen.cracked.len()
     );
-    assert!(seen.cracked.len() > 1 && seen.cracks > 5, "seed {seed}: {seen:?}");
+    assert!(!seen.cracked.is_empty(), "seed {seed}: {seen:?}");
+}
+
+#[test]
+fn headless_frames_count_their_cracks_where_they_are_measured() {
+    let Some(gpu) = gpu() else { return };
+    let terrain = white_noise(true);
+    let mut random = Random(seed(36));
+    let camera = camera(&mut random, &S0::new(&terrain));
+    for sample_count in [1, 4] {
+        let options = HeadlessOptions {
+            size_px: [96, 64],
+            sample_count,
+            view_mode: ViewMode::Shaded,
+            tint: true,
+            haze: true,
+            traced_light: true,
+            sun: Sun::default(),
+            clipmap: ClipmapOptions::default(),
+        };
+        let mut headless = Headless::new(gpu.clone(), &terrain, &options).unwrap();
+        let plain = headless.frame(&terrain, &camera, 0.0).unwrap();
+        assert_eq!(plain.cracks, None);
+        headless.measure().unwrap();
+        let measured = headless.frame(&terrain, &camera, 0.0).unwrap();
+        assert_eq!(measured.cracks, Some(0), "{sample_count} samples a pixel");
+        assert!(plain.rgba8 == measured.rgba8, "measuring changes no picture");
+    }
 }

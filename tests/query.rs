@@ -1,25 +1,22 @@
-//! Queries on the DEM's own surface and on the drawn one: closed forms, a brute-force oracle, and the device's depths.
+//! Queries on the DEM's own surface and on the drawn one: closed forms, and brute force over all
+//! triangles.
 
 mod support;
+#[path = "support/surfaces.rs"]
+mod surfaces;
 
+use clipscape::accuracy::Facet;
 use clipscape::camera::{Camera, View};
-use clipscape::clipmap::{Clipmap, ClipmapOptions, Drawn, displace};
+use clipscape::clipmap::{Clipmap, ClipmapOptions, Drawn, Place, near_m};
 use clipscape::error::{Error, ErrorKind};
-use clipscape::grid::{Grid, PATCH, Rect};
+use clipscape::grid::{Grid, Patch, Rect};
 use clipscape::levels::{Arrival, Bounds, Levels, LightSample};
-use clipscape::progress::Silent;
-use clipscape::pyramid::{Filter, Pyramid};
-use clipscape::query::{S0, Surface, collider};
-use clipscape::work::{Serial, Work};
+use clipscape::pyramid::Pyramid;
+use clipscape::query::{Picker, Reader, S0, Surface, collider};
+use clipscape::work::Work;
 use glam::DVec3;
-use support::{Formula, Random, hash, hills, seed};
-
-fn pyramid(grid: Grid, height: impl Fn(i64, i64) -> f32) -> Pyramid {
-    let heights = grid.size.rect().cells().map(|(i, j)| height(i, j)).collect();
-    let mut pyramid = Pyramid::new(grid, heights, None, &Filter::default(), &Serial, &Silent).unwrap();
-    pyramid.bound(&Serial, &Silent).unwrap();
-    pyramid
-}
+use support::{Formula, Random, hills, seed};
+use surfaces::{Diagonal, Oracle, pyramid, rough, rough_grid, small};
 
 fn camera(eye: DVec3) -> Camera {
     Camera {
@@ -37,130 +34,6 @@ fn clipmap(levels: &dyn Levels, eye: DVec3, options: &ClipmapOptions) -> Clipmap
         .update(levels, &View::new(camera(eye), [64, 64]).unwrap(), 0.0)
         .unwrap();
     clipmap
-}
-
-fn small(clip_size: i64) -> ClipmapOptions {
-    ClipmapOptions {
-        clip_size,
-        cull: false,
-        ..Default::default()
-    }
-}
-
-/// A triangle in world metres.
-type Corners = [DVec3; 3];
-
-/// Which way the quads of an oracle are split.
-#[derive(Clone, Copy, PartialEq)]
-enum Diagonal {
-    NorthWest,
-    /// The wrong one.
-    NorthEast,
-}
-
-/// All triangles of a surface, cut at the DEM's edge, for brute force.
-struct Oracle {
-    triangles: Vec<Corners>,
-    edge_m: [f64; 2],
-}
-
-impl Oracle {
-    fn new(grid: &Grid) -> Self {
-        Self {
-            triangles: Vec::new(),
-            edge_m: [
-                (grid.size.width - 1) as f64 * grid.spacing_m[0],
-                (grid.size.height - 1) as f64 * grid.spacing_m[1],
-            ],
-        }
-    }
-
-    fn push([nw, ne, sw, se]: [DVec3; 4], diagonal: Diagonal, into: &mut Vec<Corners>) {
-        let both = match diagonal {
-            Diagonal::NorthWest => [[nw, sw, se], [nw, se, ne]],
-            Diagonal::NorthEast => [[nw, sw, ne], [ne, sw, se]],
-        };
-        into.extend(both.iter().filter(|t| t.iter().all(|p| p.is_finite())));
-    }
-
-    fn truth(pyramid: &Pyramid, diagonal: Diagonal) -> Self {
-        let grid = pyramid.grid();
-        let mut oracle = Self::new(grid);
-        let point = |i: i64, j: i64| {
-            let height = pyramid.level(0)[(j * grid.size.width + i) as usize];
-            DVec3::new(
-                i as f64 * grid.spacing_m[0],
-                f64::from(height) + grid.base_m,
-                j as f64 * grid.spacing_m[1],
-            )
-        };
-        let cells = Rect::new(0, 0, grid.size.width - 1, grid.size.height - 1);
-        for (i, j) in cells.cells() {
-            let quad = [point(i, j), point(i + 1, j), point(i, j + 1), point(i + 1, j + 1)];
-            Self::push(quad, diagonal, &mut oracle.triangles);
-        }
-        oracle
-    }
-
-    /// Of the selection itself and its displaced vertices: not by [`Drawn`]'s walk.
-    fn drawn(clipmap: &Clipmap, diagonal: Diagonal) -> Self {
-        let grid = clipmap.grid();
-        let mut oracle = Self::new(grid);
-        for instance in clipmap.selection().instances() {
-            let last = grid.level(instance.level);
-            let point = |x: i32, z: i32| {
-                let vertex = displace(clipmap, instance, x, z);
-                let i = i64::from(instance.origin[0] + x).min(last.width - 1) << instance.level;
-                let j = i64::from(instance.origin[1] + z).min(last.height - 1) << instance.level;
-                let height = if vertex.void {
-                    f64::NAN
-                } else {
-                    f64::from(vertex.height)
-                };
-                DVec3::new(
-                    i as f64 * grid.spacing_m[0],
-                    height + grid.base_m,
-                    j as f64 * grid.spacing_m[1],
-                )
-            };
-            for z in 0..PATCH as i32 {
-                for x in 0..PATCH as i32 {
-                    let quad = [point(x, z), point(x + 1, z), point(x, z + 1), point(x + 1, z + 1)];
-                    Self::push(quad, diagonal, &mut oracle.triangles);
-                }
-            }
-        }
-        oracle
-    }
-
-    /// The first hits in multiples of `direction`, by triangles that are a little too large and a little too small.
-    fn ray(&self, origin: DVec3, direction: DVec3) -> [f64; 2] {
-        let mut first = [f64::INFINITY; 2];
-        for [a, b, c] in &self.triangles {
-            let (u, v) = (*b - *a, *c - *a);
-            let normal = u.cross(v);
-            let towards = normal.dot(direction);
-            if normal.y == 0.0 || towards == 0.0 {
-                continue; // no area on the ground, or seen edge on
-            }
-            let t = normal.dot(*a - origin) / towards;
-            // Its place on the ground.
-            let p = DVec3::new(origin.x - a.x, 0.0, origin.z - a.z)
-                + DVec3::new(direction.x, 0.0, direction.z) * t;
-            let area = u.x * v.z - u.z * v.x;
-            let weights = [(p.x * v.z - p.z * v.x) / area, (u.x * p.z - u.z * p.x) / area];
-            let inside = weights[0].min(weights[1]).min(1.0 - weights[0] - weights[1]);
-            let place = DVec3::new(a.x + p.x, 0.0, a.z + p.z);
-            let over = ((place.x - self.edge_m[0]) / self.edge_m[0])
-                .max((place.z - self.edge_m[1]) / self.edge_m[1]);
-            for (first, slack) in first.iter_mut().zip([1e-9, -1e-9]) {
-                if t >= -slack && inside >= -slack && over <= slack {
-                    *first = first.min(t);
-                }
-            }
-        }
-        first
-    }
 }
 
 /// A random ray about a DEM: from above, below, within its heights, or far away.
@@ -224,21 +97,6 @@ fn disagreements(
         }
     }
     (wrong, hits)
-}
-
-fn rough(i: i64, j: i64) -> f32 {
-    let void = hash(7, i / 9, j / 7) < 0.06 || hash(8, i, j) < 0.01;
-    if void {
-        f32::NAN
-    } else {
-        hills(0, i, j) + 40.0 * hash(0, i, j) as f32
-    }
-}
-
-fn rough_grid() -> Grid {
-    let mut grid = Grid::new(150, 119, [3.0, 5.0]);
-    grid.base_m = 1000.25;
-    grid
 }
 
 #[test]
@@ -465,6 +323,133 @@ fn a_spike_and_a_cone_are_met_where_their_triangles_are() {
     }
 }
 
+/// Patches in a row, each level at its own height, with nothing between them; the height of a void one is NaN.
+struct Terraces {
+    grid: Grid,
+    heights: Vec<f32>,
+    /// Whether bounds are known.
+    bounded: bool,
+}
+
+impl Surface for Terraces {
+    fn grid(&self) -> &Grid {
+        &self.grid
+    }
+    fn vertical_scale(&self) -> f64 {
+        1.0
+    }
+    fn roots(&self) -> (u32, Rect) {
+        (0, self.grid.patches(0).rect())
+    }
+    fn reader(&self) -> Box<dyn Reader + '_> {
+        Box::new(TerraceReader(self, [0.0; 81]))
+    }
+}
+
+struct TerraceReader<'a>(&'a Terraces, clipscape::clipmap::Corners);
+
+impl Reader for TerraceReader<'_> {
+    fn place(&self, _: Patch) -> Place {
+        Place::Patch
+    }
+    fn heights(&mut self, patch: Patch) -> clipscape::Result<[f32; 2]> {
+        let height = self.0.heights[patch.a as usize];
+        Ok(if self.0.bounded {
+            [height; 2]
+        } else {
+            [f32::NAN; 2]
+        })
+    }
+    fn corners(&mut self, patch: Patch) -> clipscape::Result<&clipscape::clipmap::Corners> {
+        self.1 = [self.0.heights[patch.a as usize]; 81];
+        Ok(&self.1)
+    }
+}
+
+#[test]
+fn a_ray_slips_through_no_step_between_patches_but_through_holes() {
+    let terraces = |heights: &[f32], bounded| Terraces {
+        grid: Grid::new(8 * heights.len() as i64 + 1, 17, [1.0, 1.0]),
+        heights: heights.to_vec(),
+        bounded,
+    };
+    for bounded in [false, true] {
+        for (heights, want) in [
+            // The step may be as small as rounding makes it.
+            (&[0.0, 5.0, 9.0][..], Some(8.0)),
+            (&[2.0f32.next_down(), 2.0f32.next_up()], Some(8.0)),
+            (&[2.0, 0.0], Some(0.0)),
+            (&[0.0, 0.0, 5.0], Some(16.0)),
+            (&[5.0, 5.0, 0.0], Some(16.0)),
+            (&[0.0, 1.0, 0.0], None),
+            // Over a hole nothing is carried.
+            (&[0.0, f32::NAN, 5.0], None),
+            (&[0.0, f32::NAN, 5.0, 0.0], Some(24.0)),
+            (&[f32::NAN, 5.0, 5.0], None),
+        ] {
+            let surface = terraces(heights, bounded);
+            let hit = surface.ray(DVec3::new(-3.0, 2.0, 4.25), DVec3::X).unwrap();
+            assert_eq!(hit.map(|h| h.point.x), want, "{heights:?}, bounded: {bounded}");
+            // And back, through the other side.
+            let length = (8 * heights.len()) as f64;
+            let mut turned = surface;
+            turned.heights.reverse();
+            let back = turned
+                .ray(DVec3::new(length + 3.0, 2.0, 4.25), DVec3::NEG_X)
+                .unwrap();
+            assert_eq!(back.map(|h| length - h.point.x), want, "{heights:?} turned round");
+        }
+    }
+}
+
+#[test]
+fn facets_are_what_rays_meet_about_them() {
+    let pyramid = pyramid(rough_grid(), |i, j| hills(0, i, j));
+    let seed = seed(27);
+    let mut random = Random(seed);
+    let mut checked = 0;
+    for scale in [1.0, -3.0] {
+        let s0 = S0::new(&pyramid).with_vertical_scale(scale);
+        let grid = pyramid.grid();
+        for _ in 0..100 {
+            let eye = DVec3::new(
+                random.uniform(0.0, 400.0),
+                1000.0 + 260.0 * scale.signum(),
+                random.uniform(0.0, 500.0),
+            );
+            let camera = Camera {
+                pitch_deg: -60.0,
+                ..camera(eye)
+            };
+            let view = View::new(camera, [100, 80]).unwrap();
+            let mut picker = Picker::new(&s0, &view).unwrap();
+            let pixel = [random.uniform(0.0, 100.0), random.uniform(0.0, 80.0)];
+            let Some(hit) = picker.cast(pixel).unwrap() else {
+                continue;
+            };
+            let facet = Facet::new(grid, &view, scale, &hit, pixel).unwrap();
+            let near_m = near_m(grid);
+            assert!(
+                (facet.depth / (near_m / hit.along) - 1.0).abs() < 1e-9,
+                "seed {seed}"
+            );
+            // Beside it, as long as the same triangle is met, depth is linear.
+            let beside = [pixel[0] + 0.01, pixel[1] - 0.02];
+            let next = picker.cast(beside).unwrap();
+            if let Some(next) = next.filter(|n| (n.cell, n.triangle) == (hit.cell, hit.triangle)) {
+                let linear = facet.depth + 0.01 * facet.gradient[0] - 0.02 * facet.gradient[1];
+                assert!((linear / (near_m / next.along) - 1.0).abs() < 1e-9, "seed {seed}");
+                checked += 1;
+            }
+            assert!(
+                facet.rounding() > 0.0 && facet.rounding() < 0.1 * facet.depth,
+                "{facet:?}"
+            );
+        }
+    }
+    assert!(checked > 40, "seed {seed}: {checked}");
+}
+
 #[test]
 fn large_indices_cost_nothing() {
     let side = 1 << 30;
@@ -531,7 +516,7 @@ fn picks_heed_the_near_plane_and_the_vertical_scale() {
     assert_eq!(flat.pick(&view, [50.0, 70.0]).unwrap(), None);
     // An eye a hair above the ground, looking down: what is nearer than the near plane is not drawn.
     let ground = flat.height_at(200.0, 200.0).unwrap().unwrap();
-    let near_m = clipscape::clipmap::near_m(pyramid.grid());
+    let near_m = near_m(pyramid.grid());
     for (above, found) in [(0.5, false), (2.0, true)] {
         let mut camera = camera(DVec3::new(200.0, ground + above * near_m, 200.0));
         camera.pitch_deg = -90.0;

@@ -7,16 +7,22 @@
 //!
 //! What f32 and the grid explain is [`Facet::rounding`]. A pixel is drawn at its centre, not where a ray beside it is:
 //! what such a ray has hit is compared at the centre, by the plane of its triangle. Else a pixel beside a silhouette
-//! would count where the one ray that passes it meets a slope that comes nearer on its way of 1/128 pixel.
+//! would count where the one ray that passes it meets a slope that comes nearer on its way of 1/128 pixel. What f32 may
+//! move before the near plane explains anything.
 //!
-//! *Second look.* Five rays may miss what the rasteriser's grid lets a pixel see within 1/512 pixel of its centre, on
-//! rough ground about once in 50 pictures of 128 x 128. A pixel that they call a crack is looked at again:
+//! *Second look.* Five rays may miss what rounding lets a pixel see within 1/512 pixel of its centre, on rough ground
+//! about once in 50 pictures of 128 x 128; and of a triangle that is far larger than its distance from the eye, f32
+//! moves more than 1/128 pixel. A pixel that five rays call a crack is looked at again:
 //!
-//! - by 16 rays more, on two rings between centre and sides: strips of a triangle, and gaps, may be narrower than
-//!   1/128 pixel;
-//! - by what is behind: where the grid moves the silhouette of one hill away from that of another behind it, a pixel
+//! - by more rays, on two rings between centre and sides, for strips of a triangle and gaps that are narrower than
+//!   1/128 pixel, and on a third one, as far out as rounding moves what the five have hit;
+//! - by what is behind: where rounding moves the silhouette of one hill away from that of another behind it, a pixel
 //!   sees between them what no ray sees. So it is a crack only if some distance, nearer than the depth that was drawn,
-//!   lies behind the surface on all the rays: then one sheet of ground covers them all.
+//!   lies behind the surface on all the rays: then one sheet of ground covers them all;
+//! - by what lies before that sheet: a triangle seen almost edge on may hide behind the nearer ones on every ray, and
+//!   still be drawn where the grid bares it, at a depth that its plane takes a little beside it. So what was drawn must
+//!   lie behind all that the rays meet before the sheet, one hit after another. Such a triangle may be narrower than
+//!   any ring: it is looked for by halving the way between two rays that hit different triangles.
 
 use super::{DepthImage, Facet};
 use crate::clipmap::{Drawn, Eye, near_of_m};
@@ -32,6 +38,16 @@ const FIVE: [[f64; 2]; 5] = [[0.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [
 
 /// Pixels from a pixel's centre to the rings of the second look.
 const RINGS_PX: [f64; 2] = [1.0 / 512.0, 1.0 / 256.0];
+
+/// Halvings of the way between two rays: from 1/256 pixel to the 2^-32nd of one.
+const HALVINGS: usize = 24;
+
+/// The share of a distance by which a ray goes on from one hit to look for the next: more than its rounding, less
+/// than what lies between two triangles at the end of the halvings.
+const STEP: f64 = 1e-12;
+
+/// The most hits of a ray that are looked at: rounding may find one twice.
+const MOST_HITS: usize = 64;
 
 /// The pixels of `image`, column and row, that are cracks in `drawn`, row by row.
 ///
@@ -83,8 +99,13 @@ struct Pixel<'a, 'p> {
 impl Pixel<'_, '_> {
     fn is_crack(&mut self) -> Result<bool> {
         let five = FIVE.map(|[east, south]| self.beside(east * BESIDE_PX, south * BESIDE_PX));
-        if !self.all_lie_before(&five)? {
-            return Ok(false);
+        let mut moved_px = 0.0f64;
+        for ray in five {
+            let hit = self.picker.cast(ray)?;
+            match hit.and_then(|hit| self.before(&hit)) {
+                None => return Ok(false),
+                Some(facet) => moved_px = moved_px.max(facet.place_rounding_px),
+            }
         }
         let ring = |radius: f64| {
             (0..8).map(move |k| {
@@ -92,46 +113,73 @@ impl Pixel<'_, '_> {
                 [radius * turn.cos(), radius * turn.sin()]
             })
         };
-        let rings = RINGS_PX.into_iter().flat_map(ring);
+        let [inner, outer] = RINGS_PX;
+        let farthest = outer.max(moved_px * std::f64::consts::SQRT_2);
+        let rings = [inner, outer, farthest].into_iter().flat_map(ring);
         let mut rays: Vec<_> = rings.map(|[east, south]| self.beside(east, south)).collect();
-        if !self.all_lie_before(&rays)? {
-            return Ok(false);
-        }
         rays.extend(five);
-        self.one_sheet_covers(&rays)
+        match self.sheet_m(&rays)? {
+            None => Ok(false),
+            Some(sheet_m) => {
+                let edges = self.edges(&rays)?;
+                Ok(self.all_lie_before(&rays, sheet_m)? && self.all_lie_before(&edges, sheet_m)?)
+            }
+        }
+    }
+
+    /// Rays on both sides of, and as near as f64 allows to, the edges of the triangles that the centre and others hit.
+    fn edges(&mut self, rays: &[[f64; 2]]) -> Result<Vec<[f64; 2]>> {
+        let mut edges = Vec::new();
+        let hit_at = |picker: &mut Picker<'_, _>, ray| -> Result<_> {
+            Ok(picker.cast(ray)?.map(|hit| (hit.level, hit.cell, hit.triangle)))
+        };
+        let at_centre = hit_at(self.picker, self.centre)?;
+        for &ray in rays {
+            let at_ray = hit_at(self.picker, ray)?;
+            if at_ray == at_centre {
+                continue;
+            }
+            for (from, at_from, to) in [(self.centre, at_centre, ray), (ray, at_ray, self.centre)] {
+                let (mut inside, mut outside) = (from, to);
+                for _ in 0..HALVINGS {
+                    let middle = [0, 1].map(|k| (inside[k] + outside[k]) / 2.0);
+                    if hit_at(self.picker, middle)? == at_from {
+                        inside = middle;
+                    } else {
+                        outside = middle;
+                    }
+                }
+                edges.extend([inside, outside]);
+            }
+        }
+        Ok(edges)
     }
 
     fn beside(&self, east: f64, south: f64) -> [f64; 2] {
         [self.centre[0] + east, self.centre[1] + south]
     }
 
-    /// Whether all rays hit something before what was drawn.
-    fn all_lie_before(&mut self, rays: &[[f64; 2]]) -> Result<bool> {
-        for &ray in rays {
-            let hit = self.picker.cast(ray)?;
-            if !hit.is_some_and(|hit| self.lies_before(&hit)) {
-                return Ok(false);
-            }
-        }
-        Ok(true)
-    }
-
-    fn lies_before(&self, hit: &Crossing) -> bool {
-        let grid = self.drawn.grid();
-        let hit_depth = near_of_m(self.image.view(), grid) / hit.along;
+    /// The triangle that was hit, if it lies before what was drawn.
+    fn before(&self, hit: &Crossing) -> Option<Facet> {
+        let (grid, view) = (self.drawn.grid(), self.image.view());
+        let hit_depth = near_of_m(view, grid) / hit.along;
         if self.depth >= hit_depth {
-            return false;
+            return None;
         }
-        let scale = self.drawn.clipmap().vertical_scale();
-        match Facet::new(grid, self.image.view(), scale, hit, self.centre) {
-            // Seen exactly edge on, a triangle has any depth.
-            None => false,
-            Some(facet) => self.depth < facet.depth.min(hit_depth) - facet.rounding(),
-        }
+        // Seen exactly edge on, a triangle has any depth.
+        let facet = Facet::new(
+            grid,
+            view,
+            self.drawn.clipmap().vertical_scale(),
+            hit,
+            self.centre,
+        )?;
+        let drawable = hit.along - facet.vertex_rounding_m > near_of_m(view, grid);
+        (drawable && self.depth < facet.depth.min(hit_depth) - facet.rounding()).then_some(facet)
     }
 
-    /// Whether some distance before what was drawn is behind the surface on all rays.
-    fn one_sheet_covers(&mut self, rays: &[[f64; 2]]) -> Result<bool> {
+    /// Where the surface begins to be before all rays at once, nearer than what was drawn; none where it never is.
+    fn sheet_m(&mut self, rays: &[[f64; 2]]) -> Result<Option<f64>> {
         let end_m = near_of_m(self.image.view(), self.drawn.grid()) / self.depth; // infinite where nothing was drawn
         let mut common = vec![[0.0, end_m]];
         for &ray in rays {
@@ -142,6 +190,24 @@ impl Pixel<'_, '_> {
                 .filter(|span| span[0] < span[1])
                 .collect();
         }
-        Ok(!common.is_empty())
+        Ok(common.first().map(|span| span[0]))
+    }
+
+    /// Whether all that the rays hit up to a distance lies before what was drawn.
+    fn all_lie_before(&mut self, rays: &[[f64; 2]], end_m: f64) -> Result<bool> {
+        for &ray in rays {
+            let mut start_m = near_of_m(self.image.view(), self.drawn.grid());
+            for _ in 0..MOST_HITS {
+                let hit = self.picker.cast_from(ray, start_m)?;
+                let Some(hit) = hit.filter(|hit| hit.along <= end_m) else {
+                    break;
+                };
+                if self.before(&hit).is_none() {
+                    return Ok(false);
+                }
+                start_m = hit.along * (1.0 + STEP);
+            }
+        }
+        Ok(true)
     }
 }

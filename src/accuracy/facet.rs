@@ -18,8 +18,9 @@
 //!    2^-24 of the greatest depth of what lies before the near plane. The gradient is a quotient of differences of
 //!    products: with L the triangle's extent on the screen, A its area and D its range of depths, each product is at
 //!    most D L and off by 2^-24 of it, as the corners' places are by 2^-24 of L and the picture's size S; over 2 A,
-//!    and along L, that is `2^-24 D L (L + S) / (2 A)`, a handful of times. For a sliver that is much; [`INTERPOLATION`]
-//!    is 16 times 2^-24. It never exceeds D, the depths at the corners being what they are.
+//!    and along L, that is `2^-24 D L (L + S) / (2 A)`, some 16 times. For a sliver that is much; and a device may cut
+//!    triangles that reach far over the picture's sides into slimmer ones. [`INTERPOLATION`] is 64 times 2^-24. The bound
+//!    never exceeds D, the depths at the corners being what they are.
 //!
 //! A rasteriser may take coverage from snapped corners and depth from the others: then what it draws at a pixel is the
 //! plane of a triangle that ends up to [`RASTER_PX`] beside it. So planes are compared at the pixel's centre.
@@ -38,7 +39,7 @@ pub const ROUNDING: f64 = 16.0 / (1u64 << 24) as f64;
 pub const RASTER_PX: f64 = 1.0 / 512.0;
 
 /// What the extent of a triangle, in its own width, is multiplied by to bound the rounding of depths across it.
-pub const INTERPOLATION: f64 = 16.0 / (1u64 << 24) as f64;
+pub const INTERPOLATION: f64 = 64.0 / (1u64 << 24) as f64;
 
 /// A triangle of the drawn surface as a plane on the screen.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +48,8 @@ pub struct Facet {
     pub depth: f64,
     /// How it changes per pixel to the east and to the south.
     pub gradient: [f64; 2],
+    /// How far the device's vertices may be off, in metres.
+    pub vertex_rounding_m: f64,
     /// How far a device's depth may be off at one place, whatever the gradient.
     pub depth_rounding: f64,
     /// By how many pixels a device's place on the screen may be off, along each axis.
@@ -112,6 +115,7 @@ impl Facet {
         Some(Self {
             depth: depth_along(ray),
             gradient: [depth_along(east), depth_along(south)],
+            vertex_rounding_m: moved_m,
             depth_rounding: near_m / w * (moved_m / w)
                 + ROUNDING * seen.depths[1]
                 + seen.interpolation(2.0 * half_size_px),

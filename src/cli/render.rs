@@ -75,6 +75,9 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     let terrain = Terrain::open(&args.input, terminal)?;
     warn_of_sun(args, &terrain, terminal);
     let mut headless = Headless::new(gpu, &terrain, &headless_options(&args.view, &terrain, &ring))?;
+    if args.measure {
+        headless.measure()?;
+    }
     let scale = args.view.vertical_scale;
     let heights = headless
         .clipmap()

@@ -14,6 +14,7 @@
 mod collider;
 mod drawn;
 mod ground;
+mod line;
 mod quad;
 pub mod ray;
 mod s0;
@@ -29,7 +30,7 @@ use crate::camera::View;
 use crate::clipmap::{Corners, Eye, Place, near_of_m};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Patch, Rect};
-use ray::Line;
+use line::Line;
 
 /// A surface made of patches, which can be asked for heights, normals and rays, by several threads at once.
 pub trait Surface: Sync {
@@ -174,7 +175,15 @@ impl<'a, S: Surface + ?Sized> Picker<'a, S> {
     /// # Errors
     /// As for [`Surface::pick`].
     pub fn cast(&mut self, pixel: [f64; 2]) -> Result<Option<Crossing>> {
-        let line = self.line(pixel)?;
+        self.cast_from(pixel, self.near_m)
+    }
+
+    /// The same from `start_m` metres along the view axis on: the surface may be met there a second time.
+    ///
+    /// # Errors
+    /// As for [`Surface::pick`].
+    pub fn cast_from(&mut self, pixel: [f64; 2], start_m: f64) -> Result<Option<Crossing>> {
+        let line = self.line(pixel, start_m)?;
         ray::cast(self.surface, self.reader.as_mut(), &line)
     }
 
@@ -184,18 +193,18 @@ impl<'a, S: Surface + ?Sized> Picker<'a, S> {
     /// # Errors
     /// As for [`Surface::pick`].
     pub fn behind(&mut self, pixel: [f64; 2], end_m: f64) -> Result<Vec<[f64; 2]>> {
-        let line = self.line(pixel)?;
+        let line = self.line(pixel, self.near_m)?;
         ray::behind(self.surface, self.reader.as_mut(), &line, end_m)
     }
 
-    fn line(&self, pixel: [f64; 2]) -> Result<Line> {
+    fn line(&self, pixel: [f64; 2], start_m: f64) -> Result<Line> {
         let scale = self.surface.vertical_scale();
         Line::new(
             self.surface.grid(),
             &self.eye,
             self.view.ray(pixel),
             scale,
-            self.near_m,
+            start_m,
         )
     }
 }

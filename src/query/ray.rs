@@ -17,13 +17,12 @@
 //! *Rounding.* A time is one product of an exact distance and a rounded inverse, a height above the ray a sum of five
 //! products: both are off by a few 2^-53 of their terms.
 
-use glam::DVec3;
-
-use super::ground::{self, Track};
+use super::ground;
+use super::line::{Line, Side};
 use super::{Quad, Reader, Surface, Triangle};
-use crate::clipmap::{Eye, Place};
-use crate::error::{Error, ErrorKind, Result};
-use crate::grid::{Grid, PATCH, Patch, Rect};
+use crate::clipmap::{Corners, Place};
+use crate::error::Result;
+use crate::grid::{PATCH, Patch, Rect};
 
 /// Where a ray meets a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,93 +41,6 @@ pub struct Crossing {
     pub triangle: Triangle,
     /// Whether it meets the edge between two triangles that do not agree there.
     pub wall: bool,
-}
-
-/// A ray over the ground, in time: multiples of its direction.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Line {
-    track: Track,
-    eye: Eye,
-    /// Metres up per unit of time, after vertical scale.
-    rise: f64,
-    scale: f64,
-    start: f64,
-    /// Units of time in the direction that was given.
-    factor: f64,
-}
-
-impl Line {
-    /// The ray from `eye` along `direction` (metres east, up and south, after vertical scale), from `start` on.
-    pub(super) fn new(grid: &Grid, eye: &Eye, direction: DVec3, scale: f64, start: f64) -> Result<Self> {
-        if !direction.is_finite() || direction == DVec3::ZERO {
-            let what = format!("a ray along {direction} leads nowhere");
-            return Err(Error::new(ErrorKind::Misuse, "query", what).advice("give a finite direction"));
-        }
-        // So that neither its parts nor their inverses leave f64's range.
-        let greatest = direction.abs().max_element();
-        let factor = if (1e-9..1e9).contains(&greatest) {
-            1.0
-        } else {
-            greatest
-        };
-        let direction = direction / factor;
-        Ok(Self {
-            track: Track {
-                x: ground::Axis::new(grid, eye, 0, direction.x),
-                z: ground::Axis::new(grid, eye, 1, direction.z),
-            },
-            eye: *eye,
-            rise: direction.y,
-            scale,
-            start: start * factor,
-            factor,
-        })
-    }
-
-    /// A time as a multiple of the direction that was given.
-    fn along(&self, time: f64) -> f64 {
-        time / self.factor
-    }
-
-    /// A height as metres above the eye, after vertical scale.
-    fn up(&self, height_m: f64) -> f64 {
-        if self.scale == 0.0 {
-            0.0
-        } else {
-            (height_m - self.eye.height_m) * self.scale
-        }
-    }
-
-    /// The side on which the ray stays of all that lies between two heights; none where it may meet it.
-    fn side_of(&self, heights: [f32; 2], span: [f64; 2]) -> Option<Side> {
-        let [a, b] = heights.map(|h| self.up(f64::from(h)));
-        let [c, d] = span.map(|t| self.rise * t);
-        // What is not known is NaN or infinite, and passes neither comparison.
-        if c.min(d) > a.max(b) && !a.is_nan() && !b.is_nan() {
-            Some(Side::Above)
-        } else if c.max(d) < a.min(b) && !a.is_nan() && !b.is_nan() {
-            Some(Side::Below)
-        } else {
-            None
-        }
-    }
-}
-
-/// The side of the surface on which a ray is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
-    Above,
-    Below,
-}
-
-impl Side {
-    fn of(surface_over_ray: f64) -> Option<Self> {
-        match surface_over_ray.partial_cmp(&0.0)? {
-            std::cmp::Ordering::Less => Some(Self::Above),
-            std::cmp::Ordering::Greater => Some(Self::Below),
-            std::cmp::Ordering::Equal => None,
-        }
-    }
 }
 
 /// What is carried from one patch or triangle to the next.
@@ -304,19 +216,17 @@ impl Caster<'_> {
     /// Walks the quads of a drawn patch.
     fn meet(&mut self, patch: Patch, span: [f64; 2]) -> Result<Option<Crossing>> {
         let line = self.line;
-        let mut carried = self.carried;
-        if let Carried::Passed(side, passed, span) = carried {
-            carried = if self.ends_on_surface(passed, span)? {
-                Carried::Side(side)
-            } else {
-                Carried::Nothing
-            };
+        let mut carried = match self.carried {
+            Carried::Nothing => None,
+            Carried::Side(side) | Carried::Passed(side, ..) => Some(side),
+        };
+        if let Carried::Passed(side, passed, passed_span) = self.carried {
+            let begins = begin(line, self.reader.corners(patch)?, patch, span);
+            if begins.is_some_and(|begins| begins != side) && !self.ends_on_surface(passed, passed_span)? {
+                carried = None;
+            }
         }
         let corners = self.reader.corners(patch)?;
-        let mut carried = match carried {
-            Carried::Side(side) => Some(side),
-            _ => None,
-        };
         let behind = &mut self.behind;
         let found = pieces(line, corners, patch, span, |piece| {
             let Some(heights) = piece.heights else {
@@ -392,10 +302,19 @@ impl Caster<'_> {
     }
 }
 
+/// The side on which a ray begins over a patch; none over a hole, and on the surface.
+fn begin(line: &Line, corners: &Corners, patch: Patch, span: [f64; 2]) -> Option<Side> {
+    pieces(line, corners, patch, span, |piece| {
+        let surface = piece.heights.map(|h| line.up(h[0]) - line.rise * piece.span[0]);
+        Some(surface.and_then(Side::of))
+    })
+    .flatten()
+}
+
 /// The pieces of a ray over the triangles of a patch, one after another, until `visit` has found something.
 fn pieces<T>(
     line: &Line,
-    corners: &crate::clipmap::Corners,
+    corners: &Corners,
     patch: Patch,
     span: [f64; 2],
     mut visit: impl FnMut(Piece) -> Option<T>,

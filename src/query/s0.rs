@@ -239,3 +239,37 @@ impl Reader for S0Reader<'_> {
         Ok(&self.corners)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+    use crate::pyramid::random::Random;
+    use crate::pyramid::{Filter, Pyramid};
+    use crate::work::Serial;
+
+    #[test]
+    fn a_small_cache_stays_small_and_changes_nothing() {
+        let grid = Grid::new(1100, 900, [1.0, 1.0]);
+        let mut random = Random::new(5);
+        let heights = random.heights(1100 * 900, 0.0, 100.0, 0.1);
+        let mut pyramid = Pyramid::new(grid, heights, None, &Filter::default(), &Serial, &Silent).unwrap();
+        pyramid.bound(&Serial, &Silent).unwrap();
+        let roomy = S0::new(&pyramid);
+        let tight = S0 {
+            budget_bytes: 300_000, // one tile of heights
+            ..S0::new(&pyramid)
+        };
+        for _ in 0..300 {
+            let (x, z) = (random.between(-9.0, 1110.0), random.between(-9.0, 910.0));
+            assert_eq!(roomy.height_at(x, z).unwrap(), tight.height_at(x, z).unwrap());
+            let from = glam::DVec3::new(x, 130.0, z);
+            let along = glam::DVec3::new(random.between(-9.0, 9.0), -0.5, random.between(-9.0, 9.0));
+            assert_eq!(roomy.ray(from, along).unwrap(), tight.ray(from, along).unwrap());
+            assert!(tight.cache().bytes <= tight.budget_bytes);
+        }
+        let bytes: usize = roomy.cache().tiles.values().map(|(tile, _)| tile.bytes()).sum();
+        assert_eq!(roomy.cache().bytes, bytes);
+        assert!(bytes > 10 * tight.cache().bytes, "{bytes}: all was read");
+    }
+}

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use super::crack_pass::CrackPass;
 use crate::camera::{View, check_picture};
 use crate::clipmap::{Clipmap, ClipmapOptions, UpdateReport};
 use crate::error::{Error, ErrorKind, Result};
@@ -55,8 +56,10 @@ pub struct Frame {
     pub draw_ms: f64,
     /// The draw by the device's own clock, where it has one.
     pub gpu_ms: Option<f64>,
-    /// All of it, reading back included.
+    /// All of it, reading back included, measuring not.
     pub frame_ms: f64,
+    /// Pixels that see through the drawn surface, where that is measured, see [`Headless::measure`].
+    pub cracks: Option<u64>,
 }
 
 /// Draws frames of one terrain into memory.
@@ -70,6 +73,7 @@ pub struct Headless {
     textures: ViewTextures,
     targets: Targets,
     timer: Option<Timer>,
+    crack_pass: Option<CrackPass>,
 }
 
 #[derive(Debug)]
@@ -112,6 +116,7 @@ impl Headless {
             sky: SkyRenderer::new(&gpu.device, &renderer_options)?,
             targets: Targets::new(&gpu.device, options, &renderer_options),
             timer: gpu.has_timestamps().then(|| Timer::new(&gpu)),
+            crack_pass: None,
             gpu,
             options: *options,
             clipmap,
@@ -160,6 +165,14 @@ impl Headless {
         let rgba8 = self.gpu.read_texture(&self.targets.colour, 0)?;
         let gpu_ms = self.timer.as_ref().map(|t| t.read_ms(&self.gpu)).transpose()?;
         let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
+        let frame_ms = ms(start, Instant::now());
+        let cracks = match &self.crack_pass {
+            None => None,
+            Some(pass) => {
+                let depth = &self.targets.depth;
+                Some(pass.count(&self.gpu, &self.clipmap, &self.textures, depth, view)?)
+            }
+        };
         Ok(Frame {
             rgba8,
             update,
@@ -169,8 +182,18 @@ impl Headless {
             upload_ms: ms(planned, uploaded),
             draw_ms: ms(uploaded, drawn),
             gpu_ms,
-            frame_ms: ms(start, Instant::now()),
+            frame_ms,
+            cracks,
         })
+    }
+
+    /// Measures every frame from now on: [`Frame::cracks`], from a second pass where there are several samples a pixel.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Limit`] where the system starts no threads.
+    pub fn measure(&mut self) -> Result<()> {
+        self.crack_pass = Some(CrackPass::new(&self.gpu, &self.options)?);
+        Ok(())
     }
 
     fn record(&self, encoder: &mut wgpu::CommandEncoder) -> Result<DrawReport> {

@@ -1,5 +1,6 @@
 //! Headless frames, and the files they become.
 
+mod crack_pass;
 mod headless;
 pub mod pictures;
 mod recording;

@@ -186,5 +186,6 @@ fn frame_stats(frame: &Frame, k: u64, t_s: f64, camera: &Camera) -> FrameStats {
         cut: frame.update.cut,
         stale_levels: frame.update.stale_levels,
         pops: frame.update.pops,
+        cracks: frame.cracks,
     }
 }

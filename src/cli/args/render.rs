@@ -63,6 +63,11 @@ pub(in crate::cli) struct RenderArgs {
     #[command(flatten)]
     pub(in crate::cli) view: ViewArgs,
 
+    /// Check every drawn frame, and say in --stats how many pixels see through the drawn surface (cracks); takes a
+    /// while, and needs --stats
+    #[arg(long, requires = "stats")]
+    pub(in crate::cli) measure: bool,
+
     /// Replace what exists
     #[arg(long, short)]
     pub(in crate::cli) force: bool,
@@ -162,8 +167,10 @@ mod tests {
         );
         let args = parse("render a.exr --flight orbit --frames 0..3 --view level").unwrap();
         assert_eq!((args.frames, args.view.view), (Some(0..3), ViewMode::Level));
+        assert!(!args.measure && parse("render a.exr --measure --stats b").unwrap().measure);
         for bad in [
             "render a.tif --frames 0..3",
+            "render a.tif --measure",
             "render a.tif --pitch 3",
             "render a.tif --eye 0,0,0 --flight orbit",
             "render a.tif --msaa 2",

@@ -1,0 +1,137 @@
+//! Counts the cracks of a frame: its depths, one a pixel, against the surface that it draws.
+
+use super::headless::{COLOUR_FORMAT, HeadlessOptions};
+use crate::accuracy::{DepthImage, cracks};
+use crate::build::Threads;
+use crate::camera::View;
+use crate::clipmap::{Clipmap, Drawn};
+use crate::error::Result;
+use crate::gpu::{ClipmapRenderer, Gpu, RendererOptions, ViewTextures};
+use crate::shade::ViewMode;
+
+/// What counting takes beside the frame's own state.
+pub(super) struct CrackPass {
+    threads: Threads,
+    /// For frames of several samples a pixel: a second pass of one.
+    single: Option<SinglePass>,
+}
+
+impl std::fmt::Debug for CrackPass {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("CrackPass")
+            .field("threads", &self.threads.count())
+            .field("single", &self.single)
+            .finish()
+    }
+}
+
+#[derive(Debug)]
+struct SinglePass {
+    renderer: ClipmapRenderer,
+    colour: wgpu::Texture,
+    depth: wgpu::Texture,
+}
+
+impl CrackPass {
+    /// For frames as in `options`.
+    ///
+    /// # Errors
+    /// [`crate::ErrorKind::Limit`] where the system starts no threads.
+    pub(super) fn new(gpu: &Gpu, options: &HeadlessOptions) -> Result<Self> {
+        Ok(Self {
+            threads: Threads::new(0)?,
+            single: (options.sample_count != 1)
+                .then(|| SinglePass::new(gpu, options.size_px))
+                .transpose()?,
+        })
+    }
+
+    /// The cracks of the frame that `textures` hold; `depth` is its depth texture, if it has one sample a pixel.
+    ///
+    /// # Errors
+    /// [`crate::ErrorKind::Device`] where the device failed.
+    pub(super) fn count(
+        &self,
+        gpu: &Gpu,
+        clipmap: &Clipmap,
+        textures: &ViewTextures,
+        depth: &wgpu::Texture,
+        view: &View,
+    ) -> Result<u64> {
+        let depth = match &self.single {
+            None => depth,
+            Some(single) => {
+                single.draw(gpu, clipmap, textures)?;
+                &single.depth
+            }
+        };
+        let depths: Vec<f32> = bytemuck::pod_collect_to_vec(&gpu.read_texture(depth, 0)?);
+        let image = DepthImage::new(&depths, view)?;
+        Ok(cracks(&Drawn::new(clipmap)?, &image, &self.threads)?.len() as u64)
+    }
+}
+
+impl SinglePass {
+    fn new(gpu: &Gpu, size_px: [u32; 2]) -> Result<Self> {
+        let options = RendererOptions {
+            colour_format: COLOUR_FORMAT,
+            view_mode: ViewMode::Level, // colours are not looked at
+            traced_light: false,
+            ..Default::default()
+        };
+        let texture = |label, format| {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d {
+                    width: size_px[0],
+                    height: size_px[1],
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            })
+        };
+        Ok(Self {
+            renderer: ClipmapRenderer::new(&gpu.device, &options)?,
+            colour: texture("clipscape measured colour", COLOUR_FORMAT),
+            depth: texture("clipscape measured depth", options.depth_format),
+        })
+    }
+
+    fn draw(&self, gpu: &Gpu, clipmap: &Clipmap, textures: &ViewTextures) -> Result<()> {
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                label: Some("clipscape measured frame"),
+            });
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("clipscape measured terrain"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.colour.create_view(&Default::default()),
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Discard,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth.create_view(&Default::default()),
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        self.renderer.draw(&mut pass, clipmap, textures)?;
+        drop(pass);
+        gpu.queue.submit([encoder.finish()]);
+        Ok(())
+    }
+}
