@@ -18,9 +18,11 @@
 //!    2^-24 of the greatest depth of what lies before the near plane. The gradient is a quotient of differences of
 //!    products: with L the triangle's extent on the screen, A its area and D its range of depths, each product is at
 //!    most D L and off by 2^-24 of it, as the corners' places are by 2^-24 of L and the picture's size S; over 2 A,
-//!    and along L, that is `2^-24 D L (L + S) / (2 A)`, some 16 times. For a sliver that is much; and a device may cut
-//!    triangles that reach far over the picture's sides into slimmer ones. [`INTERPOLATION`] is 64 times 2^-24. The bound
-//!    never exceeds D, the depths at the corners being what they are.
+//!    and along L, that is `2^-24 D L (L + S) / (2 A)`, some 16 times: twice two products for each part of the gradient,
+//!    as many for the area, and the corners' places. For a sliver that is much; and a device may cut triangles that reach
+//!    far over the picture's sides into slimmer ones, with corners rounded anew. [`INTERPOLATION`] is 256 times 2^-24:
+//!    over 18,000 pictures, of noise as steep as 9 km in 20 m too, the most that a pixel took was 90. It never exceeds D, the
+//!    depths at the corners being what they are.
 //!
 //! A rasteriser may take coverage from snapped corners and depth from the others: then what it draws at a pixel is the
 //! plane of a triangle that ends up to [`RASTER_PX`] beside it. So planes are compared at the pixel's centre.
@@ -39,7 +41,7 @@ pub const ROUNDING: f64 = 16.0 / (1u64 << 24) as f64;
 pub const RASTER_PX: f64 = 1.0 / 512.0;
 
 /// What the extent of a triangle, in its own width, is multiplied by to bound the rounding of depths across it.
-pub const INTERPOLATION: f64 = 64.0 / (1u64 << 24) as f64;
+pub const INTERPOLATION: f64 = 256.0 / (1u64 << 24) as f64;
 
 /// A triangle of the drawn surface as a plane on the screen.
 #[derive(Clone, Copy, Debug)]
