@@ -10,15 +10,20 @@ struct ShadeConstants {
 
 @group(0) @binding(4) var<uniform> shade: ShadeConstants;
 
+// As smoothstep from `low` on, with the reciprocal of the width, so that nothing is divided a pixel.
+fn ramp(x: f32, low: f32, per_width: f32) -> f32 {
+    let t = clamp((x - low) * per_width, 0.0, 1.0);
+    return t * t * (3.0 - 2.0 * t);
+}
+
 // The colour of the ground by its height (0 at the lowest, 1 at the highest), its height above the sea, and the up
 // component of its normal.
 fn ground_colour(rise: f32, height_m: f32, up: f32) -> vec3<f32> {
-    let green = mix(GROUND_LOW, GROUND_MIDDLE, smoothstep(0.0, 0.45, rise));
-    let meadow = mix(green, GROUND_HIGH, smoothstep(0.35, 0.9, rise));
-    let steep = 1.0 - smoothstep(ROCK_UP, MEADOW_UP, up);
-    let rock = mix(meadow, GROUND_ROCK, steep);
-    let snow = smoothstep(SNOW_LOW_M, SNOW_HIGH_M, height_m) * smoothstep(ROCK_UP, MEADOW_UP, up);
-    return mix(rock, GROUND_SNOW, snow);
+    let green = mix(GROUND_LOW, GROUND_MIDDLE, ramp(rise, 0.0, 1.0 / 0.45));
+    let meadow = mix(green, GROUND_HIGH, ramp(rise, 0.35, 1.0 / 0.55));
+    let covered = ramp(up, ROCK_UP, 1.0 / (MEADOW_UP - ROCK_UP));
+    let snow = ramp(height_m, SNOW_LOW_M, 1.0 / (SNOW_HIGH_M - SNOW_LOW_M)) * covered;
+    return mix(mix(GROUND_ROCK, meadow, covered), GROUND_SNOW, snow);
 }
 
 // Light on the ground from its shares of the sun and of the sky.
@@ -30,8 +35,8 @@ fn illumination(sun: f32, sky: f32) -> vec3<f32> {
 // `from_m` and `to_m` are the heights of the ends above the lowest ground.
 fn transmission(distance_m: f32, from_m: f32, to_m: f32) -> vec3<f32> {
     // Some adapters' exp is no number far below 0, where it should vanish; at -80 it has.
-    let a = clamp(from_m / HAZE_SCALE_M, 0.0, 80.0);
-    let b = clamp(to_m / HAZE_SCALE_M, 0.0, 80.0);
+    let a = clamp(from_m * (1.0 / HAZE_SCALE_M), 0.0, 80.0);
+    let b = clamp(to_m * (1.0 / HAZE_SCALE_M), 0.0, 80.0);
     // The mean of exp(-h) from a to b, which is exp(-a) (1 - exp(-x)) / x with x = b - a; near x = 0 by its series.
     let x = b - a;
     let is_level = abs(x) < 1e-3;
