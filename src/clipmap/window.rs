@@ -178,7 +178,7 @@ impl Window {
     }
 
     /// Moves to `target`. What that exposes is missing until [`Window::fill`] has read it.
-    pub fn move_to(&mut self, target: Rect) {
+    pub(super) fn move_to(&mut self, target: Rect) {
         if target == self.resident {
             return;
         }
