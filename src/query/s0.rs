@@ -130,6 +130,11 @@ impl<'a> S0<'a> {
         let rect = Rect::new(x, z, x + side + 1, z + side + 1).intersection(self.levels.grid().size.rect());
         let mut heights = vec![0.0; rect.area() as usize];
         arrived(self.levels.heights(0, rect, &mut heights)?)?;
+        // Infinities are no data, whatever the source says.
+        heights
+            .iter_mut()
+            .filter(|h| !h.is_finite())
+            .for_each(|h| *h = f32::NAN);
         Ok(Tile::Heights(rect, heights.into()))
     }
 
