@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::values::{number, numbers};
+use crate::camera::MIN_FOV_DEG;
 use crate::clipmap::Wait;
 use crate::shade::ViewMode;
 
@@ -24,10 +25,10 @@ pub(super) fn pitch(text: &str) -> Result<f64, String> {
 /// A field of view in degrees.
 pub(super) fn fov(text: &str) -> Result<f64, String> {
     let fov = number(text)?;
-    if fov > 0.0 && fov < 180.0 {
+    if (MIN_FOV_DEG..180.0).contains(&fov) {
         Ok(fov)
     } else {
-        Err("not above 0 and below 180 degrees".into())
+        Err(format!("not within {MIN_FOV_DEG} to below 180 degrees"))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::eye::Eye;
 use super::missing::distance;
 use super::plan::{HEIGHT_BYTES, LIGHT_BYTES, UpdatePlan};
-use super::window::{Scratch, Window};
+use super::window::{Scratch, Window, is_damage};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
 use crate::levels::{Arrival, Levels};
@@ -51,7 +51,7 @@ impl Arrivals {
         for written in plan.levels_mut() {
             let window = &mut windows[written.level as usize];
             each(window, |window, rect| {
-                match window.fill(levels, rect, written, scratch)? {
+                match window.fill(levels, rect, written, scratch, None)? {
                     Arrival::Arrived => Ok(Rect::EMPTY),
                     Arrival::Missing => {
                         let what = "data are missing that the frame needs";
@@ -68,7 +68,8 @@ impl Arrivals {
     /// The coarsest level is beyond any budget: without it nothing can be drawn.
     ///
     /// # Errors
-    /// Those of `levels` but for data that are damaged or cannot be read, which stay missing and are noted.
+    /// Those of `levels` but for data that are damaged or cannot be read, which stay missing and are noted; there is
+    /// nothing to be drawn instead of the coarsest level.
     pub(super) fn some(
         &mut self,
         levels: &dyn Levels,
@@ -106,11 +107,11 @@ impl Arrivals {
                 if part.is_empty() {
                     return Ok(rect);
                 }
-                match window.fill(levels, part, written, scratch) {
+                match window.fill(levels, part, written, scratch, Some(&mut *faults)) {
                     Ok(Arrival::Arrived) if window.level() == coarsest => {}
                     Ok(Arrival::Arrived) => left_bytes -= bytes(window, part),
                     Ok(Arrival::Missing) => return Ok(rect),
-                    Err(error) if matches!(error.kind(), ErrorKind::Broken | ErrorKind::Io) => {
+                    Err(error) if is_damage(&error) && window.level() != coarsest => {
                         window.missing.lose(part);
                         faults.push(error);
                     }

@@ -66,10 +66,10 @@ pub(super) struct FadeReport {
 pub(super) struct Moment<'a> {
     pub(super) grid: &'a Grid,
     pub(super) eye: &'a Eye,
+    /// Where it was at the last update, in samples of level 0.
+    pub(super) last_eye: [f64; 2],
     /// A level's reach R.
     pub(super) reach: f64,
-    /// Samples of level 0 that the eye has moved since the last update, the greater of east-west and north-south.
-    pub(super) moved: f64,
     /// Seconds since the last update.
     pub(super) passed_s: f64,
 }
@@ -179,6 +179,8 @@ impl HeldField {
         let patches = touched(window, moment.grid);
         let step = (1i64 << level) as f64;
         let eye = moment.eye.samples().map(|s| s / step);
+        let last_eye = moment.last_eye.map(|s| s / step);
+        let moved = (eye[0] - last_eye[0]).abs().max((eye[1] - last_eye[1]).abs()) * step;
         let span = |a: i64, b: i64| Rect::new(a * SPAN, b * SPAN, (a + 1) * SPAN + 1, (b + 1) * SPAN + 1);
         self.require(window, patches, eye, moment.reach, span);
         let fallen = (moment.passed_s / FADE_S) as f32;
@@ -200,8 +202,9 @@ impl HeldField {
                 if distance(span(a, b), eye) < moment.reach {
                     report.held[level as usize] = true;
                     // Fade rises by 1 a step; what is beyond that but for rounding, or by more than half, is a pop.
-                    let explained = (moment.moved / step).min(0.5) + 1e-3;
-                    let pops = known.is_some_and(|f| f64::from(fade - f) > explained);
+                    let explained = (moved / step).min(0.5) + 1e-3;
+                    let was_near = distance(span(a, b), last_eye) < moment.reach;
+                    let pops = was_near && known.is_some_and(|f| f64::from(fade - f) > explained);
                     report.pops[level as usize] += u64::from(pops);
                 }
             }

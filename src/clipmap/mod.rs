@@ -203,9 +203,14 @@ impl Clipmap {
             vertical_scale: self.vertical_scale,
         });
         self.eye = Some(eye);
-        // A level that the camera's climb has dropped shows nothing, late or not.
-        let shown = |level: usize| self.level_constants[level].climb < self.view_constants.reach;
-        let shown = (0..self.windows.len() - 1).filter(|l| shown(*l));
+        // A level shows nothing, late or not, where the camera has climbed beyond its reach. That is judged from the
+        // highest ground that there may be: the ground that its climb is measured from may itself be late.
+        let over_all_m = eye.height_m - f64::from(self.range_m[1]);
+        let mean_spacing_m = (self.grid.spacing_m[0] * self.grid.spacing_m[1]).sqrt();
+        let shown = (0..self.windows.len() - 1).filter(|level| {
+            let step_m = mean_spacing_m * (1i64 << level) as f64;
+            1.25 * over_all_m / step_m < self.ring.reach() as f64
+        });
         let stale_levels = shown.clone().filter(|l| fades.held[*l]).count() as u32;
         let pops = shown.map(|l| fades.pops[l]).sum();
         let coarsest_there = self.windows[self.windows.len() - 1].missing().next().is_none();
@@ -228,9 +233,7 @@ impl Clipmap {
     /// Reads what the windows miss, and holds back what has not arrived.
     fn read_and_fade(&mut self, levels: &dyn Levels, eye: &Eye, time_s: f64) -> Result<FadeReport> {
         let samples = eye.samples();
-        let moved = self.last_eye.map_or(0.0, |last| {
-            (samples[0] - last[0]).abs().max((samples[1] - last[1]).abs())
-        });
+        let last_eye = self.last_eye.unwrap_or(samples);
         let passed_s = self.last_time_s.map_or(0.0, |last| (time_s - last).max(0.0));
         (self.last_eye, self.last_time_s) = (Some(samples), Some(time_s));
         let (windows, plan, scratch) = (&mut self.windows, &mut self.plan, &mut self.scratch);
@@ -243,8 +246,8 @@ impl Clipmap {
         let moment = Moment {
             grid: &self.grid,
             eye,
+            last_eye,
             reach: self.ring.reach() as f64,
-            moved,
             passed_s,
         };
         Ok(self.held.update(&self.windows, &moment))

@@ -77,7 +77,9 @@ impl ClipmapOptions {
         }
         if self.upload_budget_bytes.is_some() && self.wait == Wait::All {
             let what = "a frame that waits for all of its data can keep no budget";
-            return Err(misuse("upload budget", what.into()).advice("draw without waiting"));
+            return Err(
+                misuse("upload budget", what.into()).advice("set wait to none, or leave the budget out")
+            );
         }
         Ok(())
     }

@@ -45,6 +45,29 @@ pub(super) fn read(source: &dyn Levels, level: u32, rect: Rect, scratch: &mut Sc
     Ok(Arrival::Arrived)
 }
 
+/// Reads `rect` of level `level` from the next coarser level into `scratch.texels`: half as fine, where the level's own
+/// data cannot be read.
+pub(super) fn read_coarser(
+    source: &dyn Levels,
+    level: u32,
+    rect: Rect,
+    scratch: &mut Scratch,
+) -> Result<Arrival> {
+    // The coarse sample where both indices are even, else the ends of the edge or diagonal that holds the texel.
+    let coarse = Rect::new(rect.x0 >> 1, rect.z0 >> 1, (rect.x1 >> 1) + 1, (rect.z1 >> 1) + 1)
+        .intersection(source.grid().level(level + 1).rect());
+    if read(source, level + 1, coarse, scratch)? == Arrival::Missing {
+        return Ok(Arrival::Missing);
+    }
+    let texels = std::mem::take(&mut scratch.texels);
+    let at = |i: i64, j: i64| texels[((j - coarse.z0) * coarse.width() + (i - coarse.x0)) as usize];
+    scratch.texels.extend(rect.cells().map(|(i, j)| -> LightTexel {
+        let (a, b) = (at(i >> 1, j >> 1), at((i + 1) >> 1, (j + 1) >> 1));
+        std::array::from_fn(|k| f16::from_f32((a[k].to_f32() + b[k].to_f32()) / 2.0))
+    }));
+    Ok(Arrival::Arrived)
+}
+
 /// The slope at `here` (rise over run, no unit) from its neighbours: central where both are there, one-sided where
 /// one is, 0 where none is or where there is no height at all.
 fn slope(before: f32, here: f32, after: f32, spacing_m: f32) -> f16 {

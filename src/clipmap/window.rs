@@ -7,7 +7,7 @@ use super::eye::Eye;
 use super::missing::Missing;
 use super::plan::LevelPlan;
 use super::relief;
-use crate::error::Result;
+use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, PATCH, Patch, Rect, Size, seam_pieces, slot};
 use crate::levels::{Arrival, Bounds, Levels};
 
@@ -84,6 +84,16 @@ impl Window {
     /// The samples that have not arrived, as disjoint rectangles. Their light has not arrived either.
     pub fn missing(&self) -> impl Iterator<Item = Rect> {
         self.missing.rects()
+    }
+
+    /// The samples that have arrived, as disjoint rectangles.
+    pub fn arrived(&self) -> Vec<Rect> {
+        self.missing().fold(vec![self.resident], |arrived, missing| {
+            arrived
+                .into_iter()
+                .flat_map(|rect| rect.difference(missing))
+                .collect()
+        })
     }
 
     /// Where the window of a level of `size` samples belongs for an eye: around it, but held within the level, so
@@ -198,6 +208,9 @@ impl Window {
     /// mirror; where they arrive, lists the rectangles that were written, split at the seams. Whoever calls takes
     /// `rect` from what is missing.
     ///
+    /// The light of a level is as fine as the next finer level, whose data may be damaged where its own are not: if
+    /// `faults` are taken, such a fault is added to them and the light is as fine as the level itself.
+    ///
     /// # Errors
     /// Those of `source`. The samples are then still missing.
     pub(super) fn fill(
@@ -206,6 +219,7 @@ impl Window {
         rect: Rect,
         written: &mut LevelPlan,
         scratch: &mut Scratch,
+        mut faults: Option<&mut Vec<Error>>,
     ) -> Result<Arrival> {
         let patches = rect.touching_patches(self.size).intersection(self.patch_resident);
         let unknown = |(a, b)| self.patches[self.patch_index(a, b)].is_none();
@@ -233,7 +247,16 @@ impl Window {
         }
         let light = self.light_of(rect);
         for piece in seam_pieces(light, self.light_n, self.light_shift) {
-            if relief::read(source, light_level(self.level), piece, scratch)? == Arrival::Missing {
+            let fine = light_level(self.level);
+            let arrival = match (relief::read(source, fine, piece, scratch), &mut faults) {
+                (Err(fault), Some(faults)) if fine < self.level && is_damage(&fault) => {
+                    let coarser = relief::read_coarser(source, fine, piece, scratch)?;
+                    faults.push(fault);
+                    coarser
+                }
+                (arrival, _) => arrival?,
+            };
+            if arrival == Arrival::Missing {
                 return Ok(Arrival::Missing);
             }
             let [x, z] = self.light_slot_of(piece.x0, piece.z0);
@@ -275,6 +298,11 @@ impl Window {
     fn patch_index(&self, a: i64, b: i64) -> usize {
         (slot(b, self.patch_slots) * self.patch_slots + slot(a, self.patch_slots)) as usize
     }
+}
+
+/// Whether an error is about data that are damaged or cannot be read, not about what was asked for.
+pub(super) fn is_damage(error: &Error) -> bool {
+    matches!(error.kind(), ErrorKind::Broken | ErrorKind::Io)
 }
 
 /// Memory that is used anew at every update.

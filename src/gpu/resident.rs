@@ -140,11 +140,13 @@ impl Resident {
                     self.light(upload, window, rect, &mut report)?;
                 }
             } else {
-                for rect in window.pieces(window.resident()) {
-                    self.heights(upload, window, rect, &mut report)?;
-                }
-                for rect in window.light_pieces(window.light_resident()) {
-                    self.light(upload, window, rect, &mut report)?;
+                for arrived in window.arrived() {
+                    for rect in window.pieces(arrived) {
+                        self.heights(upload, window, rect, &mut report)?;
+                    }
+                    for rect in window.light_pieces(window.light_of(arrived)) {
+                        self.light(upload, window, rect, &mut report)?;
+                    }
                 }
             }
         }

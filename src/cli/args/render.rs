@@ -40,7 +40,7 @@ pub(in crate::cli) struct RenderArgs {
     #[arg(requires = "eye")]
     pub(in crate::cli) roll: Option<f64>,
 
-    /// Vertical field of view in degrees [default: 60]
+    /// Vertical field of view in degrees, 0.01 to below 180 [default: 60]
     #[arg(long, value_name = "DEGREES", value_parser = view_values::fov, requires = "eye", allow_negative_numbers = true)]
     pub(in crate::cli) fov: Option<f64>,
 
@@ -102,10 +102,10 @@ pub(in crate::cli) struct ViewArgs {
     pub(in crate::cli) wait: Wait,
 
     /// The most bytes uploaded for a frame, beside the coarsest level; with --wait none
-    #[arg(long, value_name = "BYTES", value_parser = values::bytes)]
+    #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
     pub(in crate::cli) upload_budget: Option<u64>,
 
-    /// Factor on heights
+    /// Factor on heights, within 1000000 of 0
     #[arg(long, short = 'z', value_name = "S", value_parser = values::number, default_value = "1")]
     #[arg(allow_negative_numbers = true)]
     pub(in crate::cli) vertical_scale: f64,
@@ -115,7 +115,7 @@ pub(in crate::cli) struct ViewArgs {
     #[arg(long, value_name = "AZIMUTH,ALTITUDE", value_parser = values::sun, allow_hyphen_values = true)]
     pub(in crate::cli) sun: Option<Sun>,
 
-    /// What is shown: shaded, light, level, or wire
+    /// What is shown: shaded, light (the bare light), level (levels, their bands, what is held back), or wire (triangles)
     #[arg(long, value_name = "VIEW", value_parser = view_values::view, default_value = "shaded")]
     pub(in crate::cli) view: ViewMode,
 
