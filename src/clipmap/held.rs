@@ -130,6 +130,12 @@ impl HeldField {
         corner(0, 0).min(corner(1, 0)).min(corner(0, 1)).min(corner(1, 1))
     }
 
+    /// The greatest of the values at the corners of patch (a, b) of the level above `level`.
+    pub fn greatest(&self, level: u32, a: i64, b: i64) -> f32 {
+        let corner = |da, db| self.corner(level, a + da, b + db);
+        corner(0, 0).max(corner(1, 0)).max(corner(0, 1)).max(corner(1, 1))
+    }
+
     /// Whether no value is above 0.
     pub fn is_quiet(&self) -> bool {
         self.quiet

@@ -151,7 +151,9 @@ impl Selection {
             self.culled += 1;
             return;
         }
-        let voids = [own, parent].into_iter().flatten().any(|p| p.voids);
+        // A vertex is void as its own sample is, but where alpha is 1 as the coarser ones are.
+        let own_voids = own.is_some_and(|p| p.voids);
+        let voids = own_voids || parent.is_some_and(|p| p.voids) && scene.may_reach_1(patch);
         let instance = Instance {
             origin: [(patch.a * PATCH) as i32, (patch.b * PATCH) as i32],
             level: patch.level,
@@ -253,6 +255,20 @@ impl Scene<'_> {
     /// Whether all of a patch of the coarsest level is there: else nothing could be drawn in its place.
     pub(super) fn has_arrived(&self, root: Patch) -> bool {
         self.windows[root.level as usize].has_all_of(root.a, root.b)
+    }
+
+    /// Whether alpha may be 1 somewhere on a patch that is drawn; with a margin for what the shader rounds.
+    fn may_reach_1(&self, patch: Patch) -> bool {
+        let side = PATCH << patch.level;
+        let farthest = |index: i64, axis: usize| {
+            let first = (index * side - self.eye.anchor[axis]) as f64 - self.eye.fraction[axis];
+            first.abs().max((first + side as f64).abs())
+        };
+        let ground = farthest(patch.a, 0).max(farthest(patch.b, 1)) / (1i64 << patch.level) as f64;
+        let d = ground.max(f64::from(self.levels[patch.level as usize].climb));
+        let parent = patch.parent();
+        d > self.ring.reach() as f64 - MARGIN
+            || f64::from(self.held.greatest(patch.level, parent.a, parent.b)) > 1.0 - MARGIN
     }
 
     fn borders_coarser(&self, patch: Patch, neighbour: Patch) -> bool {
