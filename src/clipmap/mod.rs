@@ -151,7 +151,8 @@ impl Clipmap {
     /// # Errors
     /// [`ErrorKind::Misuse`] for a view or a time of other than finite numbers; those of `levels`, after which what
     /// could not be read is still missing and is read again by the next update. Without waiting, data that are
-    /// damaged or cannot be read are no error: the next coarser level is drawn, see [`Clipmap::take_faults`].
+    /// damaged or cannot be read are no error but on the coarsest level: the next coarser one is drawn, see
+    /// [`Clipmap::take_faults`].
     pub fn update(&mut self, levels: &dyn Levels, view: &View, time_s: f64) -> Result<&UpdateReport> {
         view.check()?;
         if !time_s.is_finite() {
