@@ -72,8 +72,7 @@ pub fn fit_clip_size(
             }
         }
         progress.advance(1);
-        // Where all is one window, a greater one draws the same.
-        if fit.broken_at.is_none() || clipmap.windows().len() == 1 {
+        if fit.broken_at.is_none() {
             break;
         }
     }

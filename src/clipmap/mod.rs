@@ -127,7 +127,11 @@ impl Clipmap {
             .map_err(|what| Error::new(ErrorKind::Misuse, "terrain", what))?;
         options.check()?;
         let ring = options.ring()?;
-        let fitting = grid.levels_until(ring.clip_size).min(levels.level_count());
+        // Beyond the first level that fits into one window the rings have nothing to add, the dial has.
+        let fitting = match options.max_error_px {
+            None => grid.levels_until(ring.clip_size).min(levels.level_count()),
+            Some(_) => levels.level_count(),
+        };
         let count = options.levels.map_or(fitting, |l| l.min(fitting));
         Ok(Self {
             identity: Identity::new(),
