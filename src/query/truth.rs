@@ -31,9 +31,6 @@ use crate::error::Result;
 use crate::grid::{Grid, PATCH, Patch, Rect};
 use crate::levels::Levels;
 
-/// Bytes of tiles that are kept by default, about: 100 million samples' worth.
-const BUDGET_BYTES: usize = 256 << 20;
-
 /// The level whose patches are tiles.
 const TILE_LEVEL: u32 = TILE_RANK - PATCH.ilog2();
 
@@ -44,7 +41,7 @@ const REMEMBERED: i64 = 8;
 pub struct Truth<'a> {
     s0: S0<'a>,
     levels: &'a dyn Levels,
-    tiles: Tiles<'a>,
+    tiles: Tiles,
 }
 
 impl std::fmt::Debug for Truth<'_> {
@@ -58,12 +55,17 @@ impl std::fmt::Debug for Truth<'_> {
 impl<'a> Truth<'a> {
     /// Level 0 of `levels`, which must be a source that waits for its data, with a factor on heights relative to the eye.
     ///
-    /// It keeps 256 MiB of tiles at most, and each [`Probe`] the 64 that it asked for last (28 MB).
+    /// It keeps 256 MiB of [`Tiles`] at most, and each [`Probe`] the 64 that it asked for last (28 MB).
     pub fn new(levels: &'a dyn Levels, vertical_scale: f64) -> Self {
+        Self::with_tiles(levels, vertical_scale, &Tiles::default())
+    }
+
+    /// The same, with tiles that an earlier truth of the same levels has read.
+    pub fn with_tiles(levels: &'a dyn Levels, vertical_scale: f64, tiles: &Tiles) -> Self {
         Self {
             s0: S0::new(levels).with_vertical_scale(vertical_scale),
             levels,
-            tiles: Tiles::new(levels, BUDGET_BYTES),
+            tiles: tiles.clone(),
         }
     }
 
@@ -254,7 +256,7 @@ fn tile<'t>(
     let slot = &mut remembered[(z * REMEMBERED + x) as usize];
     let tile = match slot.take() {
         Some((last, tile)) if last == key => tile,
-        _ => truth.tiles.tile(key)?,
+        _ => truth.tiles.tile(truth.levels, key)?,
     };
     Ok(&slot.insert((key, tile)).1)
 }
@@ -413,10 +415,7 @@ mod tests {
         let mut pyramid = Pyramid::new(grid, heights, None, &Filter::default(), &Serial, &Silent).unwrap();
         pyramid.bound(&Serial, &Silent).unwrap();
         let roomy = Truth::new(&pyramid, 1.0);
-        let tight = Truth {
-            tiles: Tiles::new(&pyramid, 500_000), // one tile
-            ..Truth::new(&pyramid, 1.0)
-        };
+        let tight = Truth::with_tiles(&pyramid, 1.0, &Tiles::new(500_000)); // one tile
         let camera = Camera {
             eye: DVec3::new(1000.0, 160.0, 400.0),
             heading_deg: 70.0,
