@@ -172,6 +172,7 @@ fn folder_error(folder: &Path, error: std::io::Error) -> Error {
 
 fn frame_stats(frame: &Frame, headless: &Headless, k: u64, t_s: f64, camera: &Camera) -> FrameStats {
     let max_error_px = headless.clipmap().max_error_px();
+    let errors = frame.measured.as_ref().map(|m| m.errors.summary);
     FrameStats {
         frame: k,
         t_s,
@@ -194,7 +195,13 @@ fn frame_stats(frame: &Frame, headless: &Headless, k: u64, t_s: f64, camera: &Ca
         cut: frame.update.cut,
         stale_levels: frame.update.stale_levels,
         pops: frame.update.pops,
-        cracks: frame.cracks,
+        error_px_max: errors.map(|e| e.error_px_max),
+        error_px_p99: errors.map(|e| e.error_px_p99),
+        error_px_rms: errors.map(|e| e.error_px_rms),
+        error_m_max: errors.map(|e| e.error_m_max),
+        error_floor_px: errors.map(|e| e.error_floor_px),
+        cracks: frame.measured.as_ref().map(|m| m.cracks),
+        silhouette_px: errors.map(|e| e.silhouette_px),
         certified_error_px: frame.certificate.error_px.ok(),
         certificate_reason: frame.certificate.error_px.err().map(|u| u.reason().to_string()),
         max_error_px,
