@@ -32,6 +32,7 @@ pub use frustum::Frustum;
 pub use held::{FADE_S, HeldField};
 pub use options::{ClipmapOptions, MAX_VERTICAL_SCALE};
 pub use plan::{HEIGHT_BYTES, LIGHT_BYTES, LevelPlan, UpdatePlan, exposed_bytes};
+pub(crate) use relief::light_texels;
 pub use selection::{CLOSER_TRIANGLES, Instance, PATCH_TRIANGLES, Scene, Selection, Side};
 pub use vertex::{Vertex, displace};
 pub use window::{LightTexel, PatchInfo, Window};
@@ -353,7 +354,7 @@ impl Clipmap {
 }
 
 /// The least and greatest height of a DEM, from the saturated bounds of its coarsest level, which are small.
-fn height_range(levels: &dyn Levels) -> Result<[f32; 2]> {
+pub(crate) fn height_range(levels: &dyn Levels) -> Result<[f32; 2]> {
     let coarsest = levels.level_count() - 1;
     let patches = levels.grid().patches(coarsest).rect();
     let mut bounds = vec![Bounds::VOID; patches.area() as usize];
