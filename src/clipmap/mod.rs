@@ -41,6 +41,7 @@ pub use frustum::Frustum;
 pub use held::{FADE_S, HeldField};
 pub use options::{ClipmapOptions, MAX_ERROR_PX, MAX_VERTICAL_SCALE};
 pub use plan::{HEIGHT_BYTES, LIGHT_BYTES, LevelPlan, UpdatePlan, exposed_bytes};
+pub(crate) use relief::light_texels;
 pub use screen::Screen;
 pub use selection::{CLOSER_TRIANGLES, Instance, PATCH_TRIANGLES, Scene, Selection, Side};
 pub use vertex::{Vertex, displace};
