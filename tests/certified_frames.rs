@@ -24,7 +24,7 @@ use support::depths::Depths;
 use support::scenes::{self, Dem, camera, dems};
 use support::{Random, gpu, seed};
 
-const SIZE_PX: [u32; 2] = [320, 180];
+const SIZE_PX: [u32; 2] = [640, 360];
 
 fn options(random: &mut Random) -> ClipmapOptions {
     let clip_size = random.pick(&[64, 128, 256]);
