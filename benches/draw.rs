@@ -38,10 +38,9 @@ const FRAME_STEP: usize = 4;
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct StaticVertex {
-    /// Samples from the eye, height, alpha.
+    /// Samples from the eye, height, level and alpha in one.
     ground: [f32; 4],
     valid: f32,
-    level: u32,
 }
 
 const STATIC_SHADER: &str = "
@@ -56,13 +55,13 @@ fn projected(ground: vec4<f32>) -> vec4<f32> {
 }
 
 @vertex
-fn static_whole(@location(0) ground: vec4<f32>, @location(1) valid: f32, @location(2) level: u32) -> WholeVaryings {
-    return WholeVaryings(projected(ground), ground, level);
+fn static_whole(@location(0) ground: vec4<f32>, @location(1) valid: f32) -> WholeVaryings {
+    return WholeVaryings(projected(ground), ground);
 }
 
 @vertex
-fn static_ragged(@location(0) ground: vec4<f32>, @location(1) valid: f32, @location(2) level: u32) -> RaggedVaryings {
-    return RaggedVaryings(projected(ground), ground, level, valid);
+fn static_ragged(@location(0) ground: vec4<f32>, @location(1) valid: f32) -> RaggedVaryings {
+    return RaggedVaryings(projected(ground), ground, valid);
 }
 ";
 
@@ -70,8 +69,8 @@ fn static_ragged(@location(0) ground: vec4<f32>, @location(1) valid: f32, @locat
 struct StaticMesh {
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
-    /// Ends of the indices of whole patches, and of all.
-    ends: [u32; 2],
+    /// Ends of the indices of still and of whole patches, and of all.
+    ends: [u32; 3],
 }
 
 impl StaticMesh {
@@ -89,16 +88,18 @@ impl StaticMesh {
                         vertex.from_eye[0],
                         vertex.from_eye[1],
                         vertex.height,
-                        vertex.alpha,
+                        2.0 * instance.level as f32 + vertex.alpha,
                     ],
                     valid: f32::from(u8::from(!vertex.void)),
-                    level: instance.level,
                 }
             }));
             first
         };
-        let mut ends = [0; 2];
-        for (patches, end) in [&selection.whole, &selection.ragged].into_iter().zip(&mut ends) {
+        let mut ends = [0; 3];
+        for (patches, end) in [&selection.still, &selection.whole, &selection.ragged]
+            .into_iter()
+            .zip(&mut ends)
+        {
             for instance in patches {
                 let first = add(instance, &mut vertices);
                 for k in 0..(PATCH * PATCH) as i32 {
@@ -124,7 +125,7 @@ impl StaticMesh {
                 }
             }
         }
-        ends[1] = indices.len() as u32;
+        ends[2] = indices.len() as u32;
         let buffer = |contents: &[u8], usage| {
             gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                 label: Some("clipscape bench static mesh"),
@@ -141,6 +142,7 @@ impl StaticMesh {
 }
 
 struct StaticPipelines {
+    still: wgpu::RenderPipeline,
     whole: wgpu::RenderPipeline,
     ragged: wgpu::RenderPipeline,
 }
@@ -149,25 +151,29 @@ impl StaticPipelines {
     fn new(gpu: &Gpu, headless: &Headless) -> Result<Self> {
         let module = module(gpu, "static.wgsl", STATIC_SHADER)?;
         let layout = headless.renderer().bind_group_layout();
-        let make = |entries| {
+        let make = |entries, morphs: f64| {
+            let mut constants = shader_constants().to_vec();
+            constants.push(("MORPHS", morphs));
             let buffers = [Some(wgpu::VertexBufferLayout {
                 array_stride: size_of::<StaticVertex>() as u64,
                 step_mode: wgpu::VertexStepMode::Vertex,
-                attributes: &wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32, 2 => Uint32],
+                attributes: &wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32],
             })];
             pipeline(
                 gpu,
                 "clipscape bench static",
                 &module,
                 &[Some(layout)],
-                &shader_constants(),
+                &constants,
                 entries,
                 &buffers,
             )
         };
+        let whole = ["static_whole", "whole_fragment"];
         Ok(Self {
-            whole: make(["static_whole", "whole_fragment"]),
-            ragged: make(["static_ragged", "ragged_fragment"]),
+            still: make(whole, 0.0),
+            whole: make(whole, 1.0),
+            ragged: make(["static_ragged", "ragged_fragment"], 1.0),
         })
     }
 
@@ -175,10 +181,15 @@ impl StaticPipelines {
         pass.set_bind_group(0, headless.textures().bind_group(), &[]);
         pass.set_vertex_buffer(0, mesh.vertices.slice(..));
         pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.set_pipeline(&self.whole);
-        pass.draw_indexed(0..mesh.ends[0], 0, 0..1);
-        pass.set_pipeline(&self.ragged);
-        pass.draw_indexed(mesh.ends[0]..mesh.ends[1], 0, 0..1);
+        let mut first = 0;
+        for (pipeline, end) in [&self.still, &self.whole, &self.ragged]
+            .into_iter()
+            .zip(mesh.ends)
+        {
+            pass.set_pipeline(pipeline);
+            pass.draw_indexed(first..end, 0, 0..1);
+            first = end;
+        }
     }
 }
 
@@ -251,11 +262,11 @@ fn displaced_or_static(gpu: &Gpu, terrain: &Terrain, frames: &[Camera], rounds: 
             headless.frame(terrain, camera, 0.0)?;
             let mesh = StaticMesh::new(gpu, headless.clipmap());
             assert_eq!(
-                u64::from(mesh.ends[1]) / 3,
+                u64::from(mesh.ends[2]) / 3,
                 headless.clipmap().selection().triangles(),
                 "both draw the same triangles"
             );
-            triangles.push(f64::from(mesh.ends[1] / 3));
+            triangles.push(f64::from(mesh.ends[2] / 3));
             let draw = |which| match which {
                 0 => targets.clipmap_ms(&headless),
                 _ => targets.draw_ms(|pass| pipelines.draw(pass, &mesh, &headless)),

@@ -119,6 +119,8 @@ pub const SKY_BELOW: Vec3 = Vec3::new(0.30, 0.38, 0.48);
 pub const SUN_GLOW: Vec3 = Vec3::new(0.55, 0.42, 0.22);
 /// Exposure before the tone curve `1 - exp(-x)`.
 pub const EXPOSURE: f32 = 0.85;
+/// Steps in which a fragment's alpha is taken: far more than light shows, far fewer than interpolation holds.
+pub const ALPHA_STEPS: f32 = 4096.0;
 /// Width in pixels of the edges that the wire view draws.
 pub const WIRE_PX: f32 = 1.0;
 /// Interpolated validity below which a fragment belongs to a hole. A corner's share of a triangle may round to a few
@@ -138,6 +140,7 @@ pub fn wgsl_constants() -> String {
     for (name, value) in [
         ("VOID_HEIGHT", VOID_HEIGHT),
         ("LIGHT_TEXEL_STEPS", LIGHT_TEXEL_STEPS as f32),
+        ("ALPHA_STEPS", ALPHA_STEPS),
         ("LIGHT_VIEW_SUN", LIGHT_VIEW[0]),
         ("LIGHT_VIEW_SKY", LIGHT_VIEW[1]),
         ("ROCK_UP", ROCK_UP),

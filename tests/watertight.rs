@@ -5,7 +5,7 @@ mod support;
 use std::collections::HashSet;
 
 use clipscape::camera::{Camera, View};
-use clipscape::clipmap::{Clipmap, ClipmapOptions, displace};
+use clipscape::clipmap::{Clipmap, ClipmapOptions, Instance, displace};
 use clipscape::grid::Grid;
 use clipscape::levels::Levels;
 use clipscape::progress::Silent;
@@ -77,11 +77,17 @@ fn control_a_side_that_is_not_closed_is_caught() {
     assert!(caught > 8, "seed {seed}: {caught} of 40");
 }
 
+/// How many of the patches that are drawn as if alpha were 0 on all of them have a vertex at which it is not.
+fn moving(clipmap: &Clipmap, shader: &Clipmap) -> usize {
+    let moves = |i: &&Instance| (0..81).any(|k| displace(shader, i, k % 9, k / 9).alpha != 0.0);
+    clipmap.selection().still.iter().filter(moves).count()
+}
+
 #[test]
 fn alpha_s_facts_hold_over_random_scenes() {
     let seed = seed(6);
     let mut random = Random(seed);
-    let (mut patches, mut mixed, mut morphing) = (0, 0, 0);
+    let (mut patches, mut mixed, mut morphing, mut still) = (0, 0, 0, 0);
     for k in 0..150 {
         let scene = scene(&mut random);
         let mut clipmap = Clipmap::new(&scene.levels, &scene.options).unwrap();
@@ -95,6 +101,8 @@ fn alpha_s_facts_hold_over_random_scenes() {
             faults.len(),
             &faults[..faults.len().min(3)]
         );
+        assert_eq!(moving(&clipmap, &clipmap), 0, "{}", place());
+        still += clipmap.selection().still.len();
         patches += clipmap.report().patches;
         mixed += u32::from(clipmap.report().levels_drawn > 1);
         let first = clipmap.selection().instances();
@@ -108,8 +116,8 @@ fn alpha_s_facts_hold_over_random_scenes() {
             .count();
     }
     assert!(
-        patches > 10_000 && mixed > 40 && morphing > 500,
-        "{patches} patches, {mixed} mixed, {morphing} morphing"
+        patches > 10_000 && mixed > 40 && morphing > 500 && still > 5_000,
+        "{patches} patches, {mixed} mixed, {morphing} morphing, {still} still"
     );
 }
 
@@ -117,7 +125,7 @@ fn alpha_s_facts_hold_over_random_scenes() {
 fn control_a_selection_that_lags_behind_the_shader_is_caught() {
     let seed = seed(7);
     let mut random = Random(seed);
-    let mut caught = 0;
+    let (mut caught, mut moved_on) = (0, 0);
     for _ in 0..40 {
         let mut scene = scene(&mut random);
         let mut clipmap = Clipmap::new(&scene.levels, &scene.options).unwrap();
@@ -127,9 +135,13 @@ fn control_a_selection_that_lags_behind_the_shader_is_caught() {
         scene.view.eye += DVec3::new(20.0 * spacing_m[0], 0.0, 20.0 * spacing_m[1]);
         moved.update(&scene.levels, &scene.view, 0.0).unwrap();
         caught += u32::from(!faults(&clipmap, &moved).is_empty());
+        moved_on += u32::from(moving(&clipmap, &moved) > 0);
     }
     // Where all that is drawn is one level, there is nothing to contradict.
-    assert!(caught > 10, "seed {seed}: {caught} of 40");
+    assert!(
+        caught > 10 && moved_on > 10,
+        "seed {seed}: {caught}, {moved_on} of 40"
+    );
 }
 
 /// A pyramid with its own saturated bounds: rough ground with voids.

@@ -4,6 +4,7 @@
 #import view colour
 #import surface function
 
+override MORPHS: bool = true;           // whether alpha may be other than 0: the coarser light is looked up
 override TRACED_LIGHT: bool = true;     // whether light texels hold traced light; else it follows from slopes
 override TINT: bool = true;             // whether the look tints the ground by height and slope
 override HAZE: bool = true;             // whether the look lays air between ground and eye
@@ -31,7 +32,7 @@ fn light_at(level: u32, from_eye: vec2<f32>) -> vec4<f32> {
 
 fn point_colour(point: GroundPoint) -> vec4<f32> {
     var texel = light_at(point.level, point.from_eye);
-    if point.alpha > 0.0 {
+    if MORPHS && point.alpha > 0.0 {
         texel = mix(texel, light_at(point.level + 1u, point.from_eye), point.alpha);
     }
     let colour = view_colour(surface_point(point, texel));

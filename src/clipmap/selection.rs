@@ -70,7 +70,9 @@ pub const CLOSER_TRIANGLES: u64 = PATCH as u64 / 2;
 /// The patches of a frame, near ones first.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
-    /// Patches without voids, wholly within the DEM.
+    /// Patches without voids, wholly within the DEM, with alpha 0 on all of them.
+    pub still: Vec<Instance>,
+    /// Other patches without voids, wholly within the DEM.
     pub whole: Vec<Instance>,
     /// Patches that may have voids or reach over the DEM's edge: their fragments may have to be discarded.
     pub ragged: Vec<Instance>,
@@ -87,7 +89,7 @@ pub struct Selection {
 impl Selection {
     /// The patches drawn.
     pub fn patches(&self) -> u64 {
-        (self.whole.len() + self.ragged.len()) as u64
+        (self.still.len() + self.whole.len() + self.ragged.len()) as u64
     }
 
     /// The triangles drawn, closing ones included.
@@ -98,11 +100,12 @@ impl Selection {
 
     /// All patches drawn.
     pub fn instances(&self) -> impl Iterator<Item = &Instance> {
-        self.whole.iter().chain(&self.ragged)
+        self.still.iter().chain(&self.whole).chain(&self.ragged)
     }
 
     /// Selects anew.
     pub fn select(&mut self, scene: &Scene<'_>) {
+        self.still.clear();
         self.whole.clear();
         self.ragged.clear();
         self.closers.iter_mut().for_each(Vec::clear);
@@ -171,8 +174,10 @@ impl Selection {
         self.levels |= 1 << patch.level;
         if voids || scene.over_the_edge(patch) {
             &mut self.ragged
-        } else {
+        } else if scene.may_leave_0(patch) {
             &mut self.whole
+        } else {
+            &mut self.still
         }
         .push(instance);
         for (side, closers) in Side::ALL.into_iter().zip(&mut self.closers) {
@@ -273,6 +278,15 @@ impl Scene<'_> {
             || f64::from(self.held.greatest(patch.level, parent.a, parent.b)) > 1.0 - MARGIN
     }
 
+    /// Whether alpha may be other than 0 somewhere on a patch that is drawn; with a margin for what the shader rounds.
+    fn may_leave_0(&self, patch: Patch) -> bool {
+        let parent = patch.parent();
+        let start = (self.ring.reach() - self.ring.transition) as f64;
+        self.has_coarser(patch.level)
+            && (self.distances(patch)[1] > start - MARGIN
+                || self.held.greatest(patch.level, parent.a, parent.b) > 0.0)
+    }
+
     /// The least and the greatest `d` on a patch, in steps of its level.
     pub(super) fn distances(&self, patch: Patch) -> [f64; 2] {
         let side = PATCH << patch.level;
@@ -303,9 +317,12 @@ impl Scene<'_> {
             && !self.refined(neighbour.parent())
     }
 
+    /// Whether a patch reaches over the DEM's edge. Its vertices end with its level's last samples, which lie on the edge
+    /// or beyond it by less than a step.
     pub(super) fn over_the_edge(&self, patch: Patch) -> bool {
-        let end = |index: i64| ((index + 1) * PATCH) << patch.level;
-        end(patch.a) > self.grid.size.width - 1 || end(patch.b) > self.grid.size.height - 1
+        let (size, level) = (self.grid.size, self.grid.level(patch.level));
+        let end = |index: i64, samples: i64| ((index + 1) * PATCH).min(samples - 1) << patch.level;
+        end(patch.a, level.width) > size.width - 1 || end(patch.b, level.height) > size.height - 1
     }
 
     /// The least and greatest height of anything that may be drawn of a patch and all below it.

@@ -25,6 +25,7 @@ pub struct DrawReport {
 pub struct ClipmapRenderer {
     layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
+    still: wgpu::RenderPipeline,
     whole: wgpu::RenderPipeline,
     ragged: wgpu::RenderPipeline,
     closer: wgpu::RenderPipeline,
@@ -44,23 +45,17 @@ impl ClipmapRenderer {
         let pipelines = pipeline_layout(device, &layout);
         let terrain = shader::module(device, "terrain.wgsl", &options.parts())?;
         let closer = shader::module(device, "closer.wgsl", &options.parts())?;
-        let pipeline = |label, module, entries| pipeline(device, label, module, &pipelines, options, entries);
+        let pipeline = |label, module, entries, morphs| {
+            pipeline(device, label, module, &pipelines, options, entries, morphs)
+        };
+        let whole = ["whole_vertex", "whole_fragment"];
+        let ragged = ["ragged_vertex", "ragged_fragment"];
+        let closing = ["vertex", "fragment"];
         Ok(Self {
-            whole: pipeline(
-                "clipscape terrain whole patches",
-                &terrain,
-                ["whole_vertex", "whole_fragment"],
-            )?,
-            ragged: pipeline(
-                "clipscape terrain ragged patches",
-                &terrain,
-                ["ragged_vertex", "ragged_fragment"],
-            )?,
-            closer: pipeline(
-                "clipscape terrain closing triangles",
-                &closer,
-                ["vertex", "fragment"],
-            )?,
+            still: pipeline("clipscape terrain still patches", &terrain, whole, false)?,
+            whole: pipeline("clipscape terrain whole patches", &terrain, whole, true)?,
+            ragged: pipeline("clipscape terrain ragged patches", &terrain, ragged, true)?,
+            closer: pipeline("clipscape terrain closing triangles", &closer, closing, true)?,
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("clipscape light sampler"),
                 address_mode_u: wgpu::AddressMode::Repeat,
@@ -142,6 +137,8 @@ impl ClipmapRenderer {
                 pass.draw_indexed(indices, 0, instances);
             }
         };
+        pass.set_pipeline(&self.still);
+        draw(pass, patch.clone(), selection.still.len());
         pass.set_pipeline(&self.whole);
         draw(pass, patch.clone(), selection.whole.len());
         pass.set_pipeline(&self.ragged);
@@ -232,9 +229,11 @@ fn pipeline(
     layout: &wgpu::PipelineLayout,
     options: &RendererOptions,
     [vertex, fragment]: [&str; 2],
+    morphs: bool,
 ) -> Result<wgpu::RenderPipeline> {
     let on = |flag: bool| f64::from(u8::from(flag));
     let constants = [
+        ("MORPHS", on(morphs)),
         ("TRACED_LIGHT", on(options.traced_light)),
         ("TINT", on(options.tint)),
         ("HAZE", on(options.haze)),
