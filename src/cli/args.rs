@@ -11,6 +11,7 @@ use clap::{Args, Parser, Subcommand};
 pub(super) use self::render::{RenderArgs, ViewArgs};
 use super::values;
 use crate::light::{DEFAULT_SKY_DIRECTIONS, Sun};
+use crate::pyramid::FilterKind;
 
 /// A terrain geometry clipmap engine: from a DEM to frames, and how wrong they are.
 #[derive(Debug, Parser)]
@@ -77,6 +78,11 @@ pub(super) struct PreprocessArgs {
     #[arg(long, value_name = "N", default_value_t = DEFAULT_SKY_DIRECTIONS)]
     #[arg(value_parser = clap::value_parser!(u32).range(0..=3600), allow_negative_numbers = true)]
     pub(super) sky_directions: u32,
+
+    /// How coarser levels are made: point, box, bilinear, cubic, lanczos3, sinc-blackman or sinc-blackman-clamped
+    #[arg(long, value_name = "NAME", value_parser = values::filter(), default_value = FilterKind::default().name())]
+    #[arg(hide_possible_values = true)]
+    pub(super) filter: FilterKind,
 
     /// Refuse a DEM that needs more memory than this, as in 512M or 2GiB
     #[arg(long, value_name = "BYTES", value_parser = values::bytes)]
