@@ -14,6 +14,7 @@
 //! - *Overshoot*: the most, in metres, by which a sample leaves the range of the finer samples within one coarse step of
 //!   it (5 x 5), which shows how much it rings; and the range of all samples of the DEM. Last rows and columns beyond the
 //!   DEM, which continue it in a straight line, are left out.
+//!   The number of lobes is decided by RMS and ringing: see [`clipscape::pyramid::DEFAULT_LOBES`].
 //! - *Time*: of filtering all levels, on all processors, the median of ROUNDS (9) in which the filters take turns.
 #![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
@@ -83,10 +84,7 @@ impl Dem {
     fn measure(&self, filter: &Filter, threads: &Threads) -> Result<Row> {
         let (mut made, _) = self.pyramid(filter, threads)?;
         made.bound(threads, &Silent)?;
-        let mut row = Row {
-            beyond_m: f64::from(made.overshoot_m()),
-            ..Row::default()
-        };
+        let mut row = Row::default();
         for level in 1..self.grid.file_levels() {
             let (rms, max) = self.strays(&made, level);
             let bounds = made.level_bounds(level).iter();
@@ -99,7 +97,9 @@ impl Dem {
             row.rms_m.push(rms);
             row.max_m.push(max);
             row.peak_loss_m.push(self.peak_loss(&made, level));
-            row.ringing_m = row.ringing_m.max(self.ringing(&made, level));
+            let [ringing, beyond] = self.overshoots(&made, level);
+            row.ringing_m = row.ringing_m.max(ringing);
+            row.beyond_m = row.beyond_m.max(beyond);
         }
         Ok(row)
     }
@@ -136,8 +136,8 @@ impl Dem {
         let (size, step) = (self.grid.level(level), 1i64 << level);
         let lost = self.peaks.iter().filter_map(|&[x, z]| {
             let near = Rect::new(
-                x.div_ceil(step) - 1,
-                z.div_ceil(step) - 1,
+                (x + step - 1) / step - 1,
+                (z + step - 1) / step - 1,
                 x / step + 2,
                 z / step + 2,
             );
@@ -152,22 +152,27 @@ impl Dem {
         lost.iter().sum::<f64>() / lost.len().max(1) as f64
     }
 
-    /// The most by which a sample leaves the range of the finer ones within one coarse step.
-    fn ringing(&self, made: &Pyramid, level: u32) -> f64 {
+    /// The most by which a sample leaves the range of the finer ones within one coarse step, and that of the whole DEM.
+    fn overshoots(&self, made: &Pyramid, level: u32) -> [f64; 2] {
         let (size, finer) = (self.grid.level(level), self.grid.level(level - 1));
-        let mut worst = 0.0f64;
+        let range = |samples: &mut dyn Iterator<Item = f32>| {
+            samples.fold((f32::NAN, f32::NAN), |(low, high), h| (low.min(h), high.max(h)))
+        };
+        let outside = |h: f32, (low, high): (f32, f32)| {
+            (f64::from(low) - f64::from(h)).max(f64::from(h) - f64::from(high))
+        };
+        let whole = range(&mut self.heights.iter().copied());
+        let mut worst = [0.0f64; 2];
         for ((i, j), &h) in size.rect().cells().zip(made.level(level)) {
-            if h.is_nan() || 2 * i >= finer.width || 2 * j >= finer.height {
+            if h.is_nan() || i << level >= self.grid.size.width || j << level >= self.grid.size.height {
                 continue;
             }
             let around = Rect::new(2 * i - 2, 2 * j - 2, 2 * i + 3, 2 * j + 3).intersection(finer.rect());
-            let samples = around
+            let near = &mut around
                 .cells()
                 .map(|(x, z)| made.level(level - 1)[(z * finer.width + x) as usize]);
-            let (low, high) = samples.fold((f32::NAN, f32::NAN), |(l, u), h| (l.min(h), u.max(h)));
-            worst = worst
-                .max(f64::from(low) - f64::from(h))
-                .max(f64::from(h) - f64::from(high));
+            worst[0] = worst[0].max(outside(h, range(near)));
+            worst[1] = worst[1].max(outside(h, whole));
         }
         worst
     }
@@ -315,8 +320,8 @@ fn main() -> Result<()> {
         FilterKind::ALL.map(|kind| (kind.to_string(), kind.into())).into();
     filters.extend((3..=6).map(|lobes| (format!("{lobes} lobes"), Filter::sinc_blackman(lobes))));
     let mut dem_count = 0;
-    // Each filter's RMS and maximum over the best one's, multiplied over DEMs and levels.
-    let mut totals = vec![[0.0f64; 3]; filters.len()];
+    // Logarithms of each filter's figures over the default's, summed over DEMs and levels.
+    let mut totals = vec![[0.0f64; 4]; filters.len()];
     let mut cases = 0;
     for path in dems(arguments.get(1..).unwrap_or_default()) {
         let dem = match Dem::read(&path) {
@@ -347,14 +352,17 @@ fn main() -> Result<()> {
             total[0] += ratio(&row.rms_m, &reference.rms_m);
             total[1] += ratio(&row.max_m, &reference.max_m);
             total[2] += ratio(&row.peak_loss_m, &reference.peak_loss_m);
+            total[3] += (row.ringing_m / reference.ringing_m).ln();
         }
         cases += reference.rms_m.len();
     }
     println!("Over {dem_count} DEMs and their levels, geometric means against the default:\n");
-    println!("| filter | RMS | max | peak loss |\n|---|---|---|---|");
+    println!("| filter | RMS | max | peak loss | rings |\n|---|---|---|---|---|");
     for ((name, _), total) in filters.iter().zip(&totals) {
-        let [rms, max, peak] = total.map(|t| (t / cases.max(1) as f64).exp());
-        println!("| {name} | {rms:.4} | {max:.4} | {peak:.3} |");
+        let mean = |total: f64, count: usize| (total / count.max(1) as f64).exp();
+        let [rms, max, peak] = [total[0], total[1], total[2]].map(|t| mean(t, cases));
+        let rings = mean(total[3], dem_count);
+        println!("| {name} | {rms:.4} | {max:.4} | {peak:.3} | {rings:.2} |");
     }
     Ok(())
 }

@@ -5,6 +5,10 @@ mod kind;
 pub use kind::FilterKind;
 
 /// Lobes a side of the default filter.
+///
+/// Decided by `cargo bench --bench filters` over six real DEMs: the RMS of `S_l - S0` over all levels falls by 2.3 % from
+/// 3 lobes to 4, by 0.9 % from 4 to 5 and by 0.2 % from 5 to 6, while what the kernel rings grows by 39, 27 and 17 %. The
+/// last lobe that gains more than 1 % is the fourth.
 pub const DEFAULT_LOBES: u32 = 4;
 
 /// The greatest number of lobes a side that a filter may have.
