@@ -12,8 +12,8 @@ use crate::error::{Error, ErrorKind};
 /// | name | t = 0 | 1 | 3 | 5 | what it is |
 /// |---|---|---|---|---|---|
 /// | `point` | 1 | | | | every second sample, as it is |
-/// | `box` | 1/3 | 1/3 | | | 1 on a coarse step (|t| <= 1), its ends included: the mean of 3 x 3 |
-/// | `bilinear` | 1/2 | 1/4 | | | the tent `1 - |t| / 2` |
+/// | `box` | 1/3 | 1/3 | | | 1 up to t = 1, itself included: the mean of 3 x 3 |
+/// | `bilinear` | 1/2 | 1/4 | | | the tent `1 - t / 2` |
 /// | `cubic` | 1/2 | 9/32 | -1/32 | | cubic convolution with a = -1/2, stretched to the coarse step |
 /// | `lanczos3` | 1/2 | 0.3057 | -0.0679 | 0.0122 | `sinc(t / 2) sinc(t / 6)` |
 /// | `sinc-blackman` | 1/2 | ... | | | the sinc windowed by Blackman, see [`Filter::sinc_blackman`] |
