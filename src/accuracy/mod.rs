@@ -1,13 +1,20 @@
 //! Accuracy: what a drawn frame's depths say about the picture, checked against the surfaces it should show.
 //!
 //! A [`DepthImage`] is what the device left. [`cracks()`] counts the pixels that see through the drawn surface; what f32
-//! and the rasteriser's grid may do to a depth is stated, and derived, by [`Facet`].
+//! and the rasteriser's grid may do to a depth is stated, and derived, by [`Facet`]. [`measure`] compares each drawn point
+//! with `S0`, pixel by pixel, and an [`ErrorPool`] takes frames together. [`ExactImage`] is what should have been drawn.
 
 mod cracks;
+mod exact;
 mod facet;
+mod measured;
+mod pool;
 
 pub use cracks::cracks;
+pub use exact::ExactImage;
 pub use facet::{Facet, INTERPOLATION, RASTER_PX, ROUNDING};
+pub use measured::{ErrorSummary, FrameErrors, PixelError, measure};
+pub use pool::{ErrorPool, RESOLUTION};
 
 use crate::camera::View;
 use crate::error::{Error, ErrorKind, Result};

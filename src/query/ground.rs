@@ -73,6 +73,19 @@ impl Axis {
         self.time(if self.speed > 0.0 { i + 1 } else { i } * step)
     }
 
+    /// When the track passes from the half of a square that it meets first to the other one, the halves meeting at the
+    /// line of sample `i`; where it follows grid lines, the half before the line is the first, and the whole at the end
+    /// of the surface.
+    pub(super) fn passes(&self, i: i64) -> f64 {
+        if self.speed != 0.0 {
+            self.time(i)
+        } else if self.to(i) > 0.0 || i >= self.last {
+            f64::INFINITY
+        } else {
+            f64::NEG_INFINITY
+        }
+    }
+
     /// The cell between `first` and `end` of a grid with this step in which the track is just after time `t`.
     fn cell(&self, first: i64, end: i64, step: i64, t: f64) -> i64 {
         let from = (self.speed * t - self.to(first * step)) / step as f64;

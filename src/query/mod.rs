@@ -18,6 +18,8 @@ mod line;
 mod quad;
 pub mod ray;
 mod s0;
+mod tile;
+mod truth;
 
 use glam::DVec3;
 
@@ -25,6 +27,7 @@ pub use collider::{Collider, MAX_COLLIDER_SAMPLES, collider};
 pub use quad::{Quad, Triangle};
 pub use ray::Crossing;
 pub use s0::S0;
+pub use truth::{Probe, Truth, Under};
 
 use crate::camera::View;
 use crate::clipmap::{Corners, Eye, Place, near_of_m};

@@ -55,13 +55,13 @@ enum Carried {
 }
 
 /// The part of a ray over one triangle.
-struct Piece {
-    cell: [i64; 2],
-    quad: Quad,
-    triangle: Triangle,
-    span: [f64; 2],
+pub(super) struct Piece {
+    pub(super) cell: [i64; 2],
+    pub(super) quad: Quad,
+    pub(super) triangle: Triangle,
+    pub(super) span: [f64; 2],
     /// The surface's height at both ends; none of both where it is a hole.
-    heights: Option<[f64; 2]>,
+    pub(super) heights: Option<[f64; 2]>,
 }
 
 struct Caster<'a> {
@@ -146,7 +146,11 @@ pub(super) fn behind<S: Surface + ?Sized>(
 }
 
 /// The crossing of a ray straight up or down.
-fn plumb<S: Surface + ?Sized>(surface: &S, reader: &mut dyn Reader, line: &Line) -> Result<Option<Crossing>> {
+pub(super) fn plumb<S: Surface + ?Sized>(
+    surface: &S,
+    reader: &mut dyn Reader,
+    line: &Line,
+) -> Result<Option<Crossing>> {
     let found = ground::find(surface, reader, &line.eye)?;
     Ok(found.and_then(|f| {
         let height_m = f.quad.height(f.at)?;
@@ -325,39 +329,51 @@ fn pieces<T>(
     let found: Result<Option<T>, std::convert::Infallible> =
         line.track.cells(cells, step, span, |i, j, span| {
             let quad = Quad::of(corners, (i - x0) as usize, (j - z0) as usize);
-            let [from, to] = span.map(|t| line.track.within(i, j, step, t));
-            let mut piece = |triangle, span: [f64; 2], from, to| {
-                let heights = quad.height_in(triangle, from).zip(quad.height_in(triangle, to));
-                visit(Piece {
-                    cell: [i, j],
-                    quad,
-                    triangle,
-                    span,
-                    heights: heights.map(|(a, b)| [a, b]),
-                })
-            };
-            // How far north-east of the diagonal.
-            let [a, b] = [from[0] - from[1], to[0] - to[1]];
-            if (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0) {
-                let share = a / (a - b);
-                let t = span[0] + (span[1] - span[0]) * share;
-                let on = from[0] + (to[0] - from[0]) * share;
-                let [first, second] = if a < 0.0 {
-                    [Triangle::SouthWest, Triangle::NorthEast]
-                } else {
-                    [Triangle::NorthEast, Triangle::SouthWest]
-                };
-                return Ok(piece(first, [span[0], t], from, [on, on])
-                    .or_else(|| piece(second, [t, span[1]], [on, on], to)));
-            }
-            let triangle = if a + b >= 0.0 {
-                Triangle::NorthEast
-            } else {
-                Triangle::SouthWest
-            };
-            Ok(piece(triangle, span, from, to))
+            Ok(pieces_of_quad(line, quad, [i, j], step, span, &mut visit))
         });
     match found {
         Ok(found) => found,
     }
+}
+
+/// The same over one quad, at column and row `cell` of a grid with steps of `step` samples.
+pub(super) fn pieces_of_quad<T>(
+    line: &Line,
+    quad: Quad,
+    cell: [i64; 2],
+    step: i64,
+    span: [f64; 2],
+    visit: &mut impl FnMut(Piece) -> Option<T>,
+) -> Option<T> {
+    let [from, to] = span.map(|t| line.track.within(cell[0], cell[1], step, t));
+    let mut piece = |triangle, span: [f64; 2], from, to| {
+        let heights = quad.height_in(triangle, from).zip(quad.height_in(triangle, to));
+        visit(Piece {
+            cell,
+            quad,
+            triangle,
+            span,
+            heights: heights.map(|(a, b)| [a, b]),
+        })
+    };
+    // How far north-east of the diagonal.
+    let [a, b] = [from[0] - from[1], to[0] - to[1]];
+    if (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0) {
+        let share = a / (a - b);
+        let t = span[0] + (span[1] - span[0]) * share;
+        let on = from[0] + (to[0] - from[0]) * share;
+        let [first, second] = if a < 0.0 {
+            [Triangle::SouthWest, Triangle::NorthEast]
+        } else {
+            [Triangle::NorthEast, Triangle::SouthWest]
+        };
+        return piece(first, [span[0], t], from, [on, on])
+            .or_else(|| piece(second, [t, span[1]], [on, on], to));
+    }
+    let triangle = if a + b >= 0.0 {
+        Triangle::NorthEast
+    } else {
+        Triangle::SouthWest
+    };
+    piece(triangle, span, from, to)
 }

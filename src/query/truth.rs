@@ -1,0 +1,396 @@
+//! `S0` for millions of rays: the same hits as [`S0`] gives, sooner.
+//!
+//! [`Truth`] keeps level 0 in tiles of 256 x 256 quads with the ranges of heights in squares of 2^k quads (a maximum
+//! mipmap, as in Tevs, Ihrke and Seidel, *Maximum Mipmaps for Fast, Accurate, and Scalable Dynamic Height Field
+//! Rendering*, 2008, with minima for what is seen from below). A [`Probe`] walks them for one thread.
+//!
+//! *The walk.* The ray's track over the ground is cut where it crosses the lines through a square's middle, which gives
+//! the spans of time over its quarters, in order, at one product for each line. A square is passed over where the ray
+//! stays above its greatest or below its least height; quads are met as the plain caster in `ray.rs` meets them, by
+//! the same function. Times of lines are the same bits in both, so are the spans over quads, and so are the hits.
+//!
+//! *Sides.* The side on which the ray is, above or below the surface, is carried from square to square. A ray that
+//! passes over a square on one side and begins over the next on the other has met the surface between them, or come
+//! through a hole. It has not come through a hole: the line between the two squares is an edge of both, at whose ends
+//! samples are valid where the second one's surface begins, and ranges hold those. So nothing needs to be looked up
+//! at the end of what was passed over; levels that do not agree there, which the plain caster allows for, are not met
+//! on `S0`.
+//!
+//! Above the tiles the stored bounds of coarser levels are asked for (`Reader::heights` of [`S0`]), so ground over which
+//! rays pass high is never read.
+
+use std::sync::Arc;
+
+use super::line::{Line, Side};
+use super::ray::{Piece, pieces_of_quad, plumb};
+use super::tile::{TILE, TILE_RANK, Tile, Tiles};
+use super::{Crossing, Quad, Reader, S0, Surface, Triangle};
+use crate::camera::View;
+use crate::clipmap::{Eye, near_of_m};
+use crate::error::Result;
+use crate::grid::{Grid, PATCH, Patch, Rect};
+use crate::levels::Levels;
+
+/// Bytes of tiles that are kept by default, about: 100 million samples' worth.
+const BUDGET_BYTES: usize = 256 << 20;
+
+/// The level whose patches are tiles.
+const TILE_LEVEL: u32 = TILE_RANK - PATCH.ilog2();
+
+/// Tiles along a side of the square of them that a probe remembers.
+const REMEMBERED: i64 = 8;
+
+/// The surface of a DEM's own samples, for many rays and threads.
+pub struct Truth<'a> {
+    s0: S0<'a>,
+    levels: &'a dyn Levels,
+    tiles: Tiles<'a>,
+}
+
+impl std::fmt::Debug for Truth<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Truth")
+            .field("s0", &self.s0)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Truth<'a> {
+    /// Level 0 of `levels`, which must be a source that waits for its data, with a factor on heights relative to the eye.
+    ///
+    /// It keeps 256 MiB of tiles at most, and each [`Probe`] the 64 that it asked for last (28 MB).
+    pub fn new(levels: &'a dyn Levels, vertical_scale: f64) -> Self {
+        Self {
+            s0: S0::new(levels).with_vertical_scale(vertical_scale),
+            levels,
+            tiles: Tiles::new(levels, BUDGET_BYTES),
+        }
+    }
+
+    /// The levels.
+    pub fn levels(&self) -> &'a dyn Levels {
+        self.levels
+    }
+
+    /// Where the samples lie.
+    pub fn grid(&self) -> &Grid {
+        self.levels.grid()
+    }
+
+    /// Factor on heights relative to the eye, as drawn; may be 0 or negative.
+    pub fn vertical_scale(&self) -> f64 {
+        self.s0.vertical_scale()
+    }
+
+    /// The same surface by the plain caster.
+    pub fn plain(&self) -> &S0<'a> {
+        &self.s0
+    }
+}
+
+/// A place of the ground, and the quad that holds it.
+#[derive(Clone, Copy, Debug)]
+pub struct Under {
+    /// The quad.
+    pub quad: Quad,
+    /// Its column and row.
+    pub cell: [i64; 2],
+    /// Where in it the place is, 0 to 1 from west to east and from north to south.
+    pub at: [f64; 2],
+}
+
+/// Casts rays through the pixels of one view over a [`Truth`], for one thread.
+pub struct Probe<'a> {
+    truth: &'a Truth<'a>,
+    view: View,
+    eye: Eye,
+    near_m: f64,
+    /// Ranges of squares larger than a tile.
+    bounds: Box<dyn Reader + 'a>,
+    remembered: Vec<Option<([i64; 2], Arc<Tile>)>>,
+}
+
+impl std::fmt::Debug for Probe<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Probe")
+            .field("view", &self.view)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Probe<'a> {
+    /// A probe for `view` over `truth`.
+    ///
+    /// # Errors
+    /// [`crate::ErrorKind::Misuse`] for a view of other than finite numbers.
+    pub fn new(truth: &'a Truth<'a>, view: &View) -> Result<Self> {
+        view.check()?;
+        Ok(Self {
+            truth,
+            view: *view,
+            eye: Eye::new(view.eye, truth.grid()),
+            near_m: near_of_m(view, truth.grid()),
+            bounds: truth.s0.reader(),
+            remembered: vec![None; (REMEMBERED * REMEMBERED) as usize],
+        })
+    }
+
+    /// The eye.
+    pub fn eye(&self) -> &Eye {
+        &self.eye
+    }
+
+    /// Nearest drawn distance along the view axis.
+    pub fn near_m(&self) -> f64 {
+        self.near_m
+    }
+
+    /// Where the ray through a place of the picture first meets the surface, from the near plane on, as
+    /// [`super::Picker::cast`] says.
+    ///
+    /// # Errors
+    /// [`crate::ErrorKind::Misuse`] for other than finite numbers; those of reading.
+    pub fn cast(&mut self, pixel: [f64; 2]) -> Result<Option<Crossing>> {
+        self.cast_from(pixel, self.near_m)
+    }
+
+    /// The same from `start_m` metres along the view axis on.
+    ///
+    /// # Errors
+    /// As for [`Probe::cast`].
+    pub fn cast_from(&mut self, pixel: [f64; 2], start_m: f64) -> Result<Option<Crossing>> {
+        let truth = self.truth;
+        let scale = truth.vertical_scale();
+        let line = Line::new(truth.grid(), &self.eye, self.view.ray(pixel), scale, start_m)?;
+        if line.track.stands() {
+            return plumb(&truth.s0, self.bounds.as_mut(), &line);
+        }
+        let (coarsest, roots) = truth.s0.roots();
+        let level = coarsest.max(TILE_LEVEL);
+        let roots = if level == coarsest {
+            roots
+        } else {
+            let tiles = |samples: i64| (samples - 1 + TILE - 1) / TILE;
+            let size = truth.grid().size;
+            Rect::new(0, 0, tiles(size.width), tiles(size.height))
+        };
+        let step = PATCH << level;
+        let Some(span) = line.track.over(roots, step, [line.start, f64::INFINITY]) else {
+            return Ok(None);
+        };
+        let mut walk = Walk::new(&line);
+        line.track.cells(roots, step, span, |a, b, span| {
+            self.visit(&mut walk, Patch::new(level, a, b), coarsest, span)
+        })
+    }
+
+    /// A square of at least a tile.
+    fn visit(
+        &mut self,
+        walk: &mut Walk<'_>,
+        patch: Patch,
+        coarsest: u32,
+        span: [f64; 2],
+    ) -> Result<Option<Crossing>> {
+        if patch.level <= coarsest && walk.passes_over(self.bounds.heights(patch)?, span) {
+            return Ok(None);
+        }
+        if patch.level == TILE_LEVEL {
+            let key = [patch.a, patch.b];
+            let tile = tile(self.truth, &mut self.remembered, key)?;
+            return Ok(walk.square(tile, key.map(|k| k * TILE), TILE_RANK, [0; 2], span));
+        }
+        let half = PATCH << (patch.level - 1);
+        let middle = [2 * patch.a + 1, 2 * patch.b + 1].map(|k| k * half);
+        for (side, span) in walk.quarters(middle, span) {
+            if span[0] < span[1] {
+                let child = Patch::new(patch.level - 1, 2 * patch.a + side[0], 2 * patch.b + side[1]);
+                let found = self.visit(walk, child, coarsest, span)?;
+                if found.is_some() {
+                    return Ok(found);
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// The quad of a place, metres east and south of the eye; none off the DEM.
+    ///
+    /// # Errors
+    /// Those of reading.
+    pub fn under(&mut self, from_eye_m: [f64; 2]) -> Result<Option<Under>> {
+        let grid = self.truth.grid();
+        let (mut cell, mut at) = ([0; 2], [0.0; 2]);
+        for axis in 0..2 {
+            let last = [grid.size.width, grid.size.height][axis] - 1;
+            let from_anchor = self.eye.fraction[axis] + from_eye_m[axis] / grid.spacing_m[axis];
+            let [first, end] = [0, last].map(|i| (i - self.eye.anchor[axis]) as f64);
+            // Also where it is no number.
+            if last == 0 || !(first..=end).contains(&from_anchor) {
+                return Ok(None);
+            }
+            let whole = from_anchor.floor().min(end - 1.0);
+            cell[axis] = self.eye.anchor[axis] + whole as i64;
+            at[axis] = from_anchor - whole;
+        }
+        let key = cell.map(|c| c.div_euclid(TILE));
+        let [x, z] = cell.map(|c| c.rem_euclid(TILE) as usize);
+        let tile = tile(self.truth, &mut self.remembered, key)?;
+        Ok(Some(Under {
+            quad: tile.quad(x, z),
+            cell,
+            at,
+        }))
+    }
+}
+
+/// A tile, by way of those that a probe remembers.
+fn tile<'t>(
+    truth: &Truth<'_>,
+    remembered: &'t mut [Option<([i64; 2], Arc<Tile>)>],
+    key: [i64; 2],
+) -> Result<&'t Tile> {
+    let [x, z] = key.map(|k| k.rem_euclid(REMEMBERED));
+    let slot = &mut remembered[(z * REMEMBERED + x) as usize];
+    let tile = match slot.take() {
+        Some((last, tile)) if last == key => tile,
+        _ => truth.tiles.tile(key)?,
+    };
+    Ok(&slot.insert((key, tile)).1)
+}
+
+/// A ray on its way.
+struct Walk<'a> {
+    line: &'a Line,
+    /// The side on which it was last; none after a hole.
+    carried: Option<Side>,
+    /// Which half of a square it meets first, along each axis: the western or northern one is 0.
+    first: [i64; 2],
+}
+
+impl<'a> Walk<'a> {
+    fn new(line: &'a Line) -> Self {
+        let first = |speed: f64| i64::from(speed < 0.0);
+        Self {
+            line,
+            carried: None,
+            first: [first(line.track.x.speed), first(line.track.z.speed)],
+        }
+    }
+
+    /// Whether the ray stays on the side of all that lies between two heights on which it was before.
+    fn passes_over(&mut self, heights: [f32; 2], span: [f64; 2]) -> bool {
+        let Some(side) = self.line.side_of(heights, span) else {
+            return false;
+        };
+        let same = self.carried.is_none_or(|carried| carried == side);
+        if same {
+            self.carried = Some(side);
+        }
+        same
+    }
+
+    /// The quarters of a square about `middle` in the order in which the ray meets them, some for no time at all.
+    fn quarters(&self, middle: [i64; 2], span: [f64; 2]) -> [([i64; 2], [f64; 2]); 3] {
+        let track = &self.line.track;
+        let [x, z] = [track.x.passes(middle[0]), track.z.passes(middle[1])];
+        let [first, second] = [x.min(z), x.max(z)].map(|t| t.max(span[0]).min(span[1]));
+        let [a, b] = self.first;
+        let between = if x < z { [1 - a, b] } else { [a, 1 - b] };
+        [
+            ([a, b], [span[0], first]),
+            (between, [first, second]),
+            ([1 - a, 1 - b], [second, span[1]]),
+        ]
+    }
+
+    /// Square `at` of a rank in a tile that begins at sample `origin`.
+    fn square(
+        &mut self,
+        tile: &Tile,
+        origin: [i64; 2],
+        rank: u32,
+        at: [i64; 2],
+        span: [f64; 2],
+    ) -> Option<Crossing> {
+        if rank == 0 {
+            return self.quad(tile, origin, at, span);
+        }
+        let range = tile.range(rank, at[0] as usize, at[1] as usize);
+        if self.passes_over(range, span) {
+            return None;
+        }
+        if range[0].is_nan() {
+            self.carried = None;
+            return None;
+        }
+        let half = 1i64 << (rank - 1);
+        let middle = [0, 1].map(|axis| origin[axis] + (2 * at[axis] + 1) * half);
+        for (side, span) in self.quarters(middle, span) {
+            if span[0] < span[1] {
+                let at = [0, 1].map(|axis| 2 * at[axis] + side[axis]);
+                let found = self.square(tile, origin, rank - 1, at, span);
+                if found.is_some() {
+                    return found;
+                }
+            }
+        }
+        None
+    }
+
+    fn quad(&mut self, tile: &Tile, origin: [i64; 2], at: [i64; 2], span: [f64; 2]) -> Option<Crossing> {
+        let line = self.line;
+        let quad = tile.quad(at[0] as usize, at[1] as usize);
+        let cell = [0, 1].map(|axis| origin[axis] + at[axis]);
+        pieces_of_quad(line, quad, cell, 1, span, &mut |piece| self.meet(piece))
+    }
+
+    /// As the plain caster meets a triangle.
+    fn meet(&mut self, piece: Piece) -> Option<Crossing> {
+        let line = self.line;
+        let Some(heights) = piece.heights else {
+            self.carried = None;
+            return None;
+        };
+        let [first, last] = [0, 1].map(|k| line.up(heights[k]) - line.rise * piece.span[k]);
+        let before = self.carried.or(Side::of(first));
+        self.carried = Side::of(last);
+        let wall = before != Side::of(first);
+        let share = if wall || first == 0.0 {
+            0.0
+        } else if self.carried != before {
+            first / (first - last)
+        } else {
+            return None;
+        };
+        Some(Crossing {
+            along: line.along(piece.span[0] + (piece.span[1] - piece.span[0]) * share),
+            height_m: heights[0] + (heights[1] - heights[0]) * share,
+            level: 0,
+            cell: piece.cell,
+            quad: piece.quad,
+            triangle: piece.triangle,
+            wall: wall && first != 0.0,
+        })
+    }
+}
+
+impl Under {
+    /// The surface's height there, metres above the DEM's base; none in a hole.
+    pub fn height_m(&self) -> Option<f64> {
+        self.quad.height(self.at)
+    }
+
+    /// The triangle there as what a ray meets `along` times its direction away.
+    pub fn crossing(&self, along: f64, height_m: f64) -> Crossing {
+        Crossing {
+            along,
+            height_m,
+            level: 0,
+            cell: self.cell,
+            quad: self.quad,
+            triangle: Triangle::holding(self.at),
+            wall: false,
+        }
+    }
+}
