@@ -24,15 +24,19 @@ pub enum ViewMode {
     Level,
     /// The edges of the triangles that are drawn, over the ground.
     Wire,
+    /// The error of each pixel in a colour, over the light. What draws frames lays the colours over them, once it has
+    /// measured them; the GPU draws the light alone.
+    Error,
 }
 
 impl ViewMode {
     /// All modes with the names by which people ask for them.
-    pub const NAMED: [(&'static str, Self); 4] = [
+    pub const NAMED: [(&'static str, Self); 5] = [
         ("shaded", Self::Shaded),
         ("light", Self::Light),
         ("level", Self::Level),
         ("wire", Self::Wire),
+        ("error", Self::Error),
     ];
 
     /// Its name, which is also that of its function in the shader.

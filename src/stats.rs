@@ -50,8 +50,21 @@ pub struct FrameStats {
     pub stale_levels: u32,
     /// Patches whose detail vanished at once, because their data came too late to be taken back gently.
     pub pops: u64,
-    /// Pixels that see through the drawn surface; null unless measured.
+    /// Greatest error on the screen, in pixels ([`crate::accuracy`] says what is measured); null unless measured, as all
+    /// that follow.
+    pub error_px_max: Option<f64>,
+    /// Its 99th percentile over the pixels of terrain.
+    pub error_px_p99: Option<f64>,
+    /// The root of its mean square.
+    pub error_px_rms: Option<f64>,
+    /// Greatest error of a height in metres, before vertical scale.
+    pub error_m_max: Option<f64>,
+    /// The greatest floor that was taken off an error in pixels: what the rasteriser's grid and f32 may add.
+    pub error_floor_px: Option<f64>,
+    /// Pixels that see through the drawn surface.
     pub cracks: Option<u64>,
+    /// Pixels at which the exact image and the drawn one disagree about being terrain.
+    pub silhouette_px: Option<u64>,
 }
 
 /// Median and 99th percentile of one quantity over a run, by [`percentile`].
@@ -93,6 +106,25 @@ pub struct Run {
     pub input_checksum: Option<String>,
     /// Faults met on the way that did not end the run.
     pub faults: u64,
+    /// The errors of all frames together, where they were measured.
+    pub errors: Option<PooledErrors>,
+}
+
+/// The errors of all frames together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PooledErrors {
+    /// Of [`FrameStats::error_px_max`], the greatest.
+    pub error_px_max: f64,
+    /// The 99th percentile over the pixels of all frames, too great by less than 1/128 of itself.
+    pub error_px_p99: f64,
+    /// The root of the mean square over the pixels of all frames.
+    pub error_px_rms: f64,
+    /// Of [`FrameStats::error_m_max`], the greatest.
+    pub error_m_max: f64,
+    /// Of [`FrameStats::error_floor_px`], the greatest.
+    pub error_floor_px: f64,
+    /// Which of the frames has the greatest error.
+    pub worst_frame: u64,
 }
 
 /// The last line of `render --stats`.
@@ -129,12 +161,30 @@ pub struct SummaryStats {
     pub triangles: Option<Spread>,
     /// Of [`FrameStats::upload_bytes`].
     pub upload_bytes: Option<Spread>,
+    /// Of [`PooledErrors::error_px_max`]; null unless measured, as all that follow.
+    pub error_px_max: Option<f64>,
+    /// Of [`PooledErrors::error_px_p99`].
+    pub error_px_p99: Option<f64>,
+    /// Of [`PooledErrors::error_px_rms`].
+    pub error_px_rms: Option<f64>,
+    /// Of [`PooledErrors::error_m_max`].
+    pub error_m_max: Option<f64>,
+    /// Of [`PooledErrors::error_floor_px`].
+    pub error_floor_px: Option<f64>,
+    /// Of [`PooledErrors::worst_frame`].
+    pub error_worst_frame: Option<u64>,
+    /// The sum of [`FrameStats::cracks`].
+    pub cracks: Option<u64>,
+    /// The sum of [`FrameStats::silhouette_px`].
+    pub silhouette_px: Option<u64>,
 }
 
 impl SummaryStats {
     /// Sums up `frames` of `run`.
     pub fn new(run: Run, frames: &[FrameStats]) -> Self {
         let spread = |of: fn(&FrameStats) -> f64| Spread::of(frames.iter().map(of).collect());
+        let measured = run.errors.is_some();
+        let sum = |of: fn(&FrameStats) -> Option<u64>| measured.then(|| frames.iter().filter_map(of).sum());
         Self {
             summary: true,
             frames: frames.len() as u64,
@@ -151,6 +201,14 @@ impl SummaryStats {
             frame_ms: spread(|f| f.frame_ms),
             triangles: spread(|f| f.triangles as f64),
             upload_bytes: spread(|f| f.upload_bytes as f64),
+            error_px_max: run.errors.map(|e| e.error_px_max),
+            error_px_p99: run.errors.map(|e| e.error_px_p99),
+            error_px_rms: run.errors.map(|e| e.error_px_rms),
+            error_m_max: run.errors.map(|e| e.error_m_max),
+            error_floor_px: run.errors.map(|e| e.error_floor_px),
+            error_worst_frame: run.errors.map(|e| e.worst_frame),
+            cracks: sum(|f| f.cracks),
+            silhouette_px: sum(|f| f.silhouette_px),
         }
     }
 }
@@ -200,7 +258,13 @@ mod tests {
             cut: false,
             stale_levels: 0,
             pops: 0,
+            error_px_max: Some(0.5 * frame as f64),
+            error_px_p99: None,
+            error_px_rms: None,
+            error_m_max: None,
+            error_floor_px: None,
             cracks: None,
+            silhouette_px: Some(2),
         }
     }
 
@@ -233,7 +297,8 @@ mod tests {
         let json = serde_json::to_string(&frame(3)).unwrap();
         let names: Vec<&str> = json.split('"').skip(1).step_by(2).collect();
         let documented = "frame t_s eye plan_ms upload_ms draw_ms gpu_ms frame_ms triangles draw_calls patches \
-            patches_culled levels_drawn uploads upload_bytes upload_bytes_exposed complete cut stale_levels pops cracks";
+            patches_culled levels_drawn uploads upload_bytes upload_bytes_exposed complete cut stale_levels pops \
+            error_px_max error_px_p99 error_px_rms error_m_max error_floor_px cracks silhouette_px";
         assert_eq!(names, documented.split_whitespace().collect::<Vec<_>>());
         assert!(
             json.contains("\"gpu_ms\":null") && json.contains("\"cracks\":null"),
@@ -269,6 +334,21 @@ mod tests {
         let json = serde_json::to_string(&summary).unwrap();
         assert!(json.starts_with("{\"summary\":true,"), "{json}");
         assert!(serde_json::from_str::<FrameStats>(&json).is_err());
+        assert_eq!((summary.error_px_max, summary.silhouette_px), (None, None));
+        let run = Run {
+            errors: Some(PooledErrors {
+                error_px_max: 99.5,
+                worst_frame: 199,
+                ..PooledErrors::default()
+            }),
+            ..Run::default()
+        };
+        let summary = SummaryStats::new(run, &frames);
+        assert_eq!(
+            (summary.error_px_max, summary.error_worst_frame),
+            (Some(99.5), Some(199))
+        );
+        assert_eq!((summary.silhouette_px, summary.cracks), (Some(400), Some(0)));
         let empty = SummaryStats::new(Run::default(), &[]);
         assert_eq!((empty.frames, empty.frame_ms), (0, None));
     }

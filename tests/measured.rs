@@ -77,7 +77,10 @@ fn camera(random: &mut Random, vertical_scale: f64) -> Camera {
     }
 }
 
-fn rounds() -> [(&'static str, fn(i64, i64) -> f32, f64); 6] {
+/// A name, heights, and a vertical scale.
+type Round = (&'static str, fn(i64, i64) -> f32, f64);
+
+fn rounds() -> [Round; 6] {
     [
         ("plane", plane, 1.0),
         ("plane", plane, -2.0),

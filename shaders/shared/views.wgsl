@@ -9,6 +9,11 @@ fn view_light(point: SurfacePoint) -> vec4<f32> {
     return vec4(vec3(grey(point)), 1.0);
 }
 
+// The light under the colours of errors, which are measured and laid over it on the CPU.
+fn view_error(point: SurfacePoint) -> vec4<f32> {
+    return view_light(point);
+}
+
 // A hue per level; white where the ring slides it into the next one, hatched where that is held: the black share of the
 // hatching is the held one.
 fn view_level(point: SurfacePoint) -> vec4<f32> {

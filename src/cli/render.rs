@@ -17,7 +17,7 @@ use crate::grid::Grid;
 use crate::levels::Levels;
 use crate::progress::Progress;
 use crate::render::{Headless, HeadlessOptions, Recording, picture};
-use crate::stats::{FrameStats, Run, SummaryStats};
+use crate::stats::{FrameStats, PooledErrors, Run, SummaryStats};
 use crate::stream::Terrain;
 
 /// Vertical field of view where none is given, degrees.
@@ -120,6 +120,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
             flight_checksum: flight_json.as_ref().map(|(_, json)| checksum(json.as_bytes())),
             input_checksum: file_checksum(&args.input)?,
             faults: faults.len() as u64,
+            errors: pooled_errors(&headless, &frames),
         };
         write_stats(&file, path, &frames, run)?;
         output.publish(&file)?;
@@ -271,6 +272,21 @@ fn write_stats(mut file: &fs::File, path: &Path, frames: &[FrameStats], run: Run
     text.push('\n');
     file.write_all(text.as_bytes())
         .map_err(|e| Error::io(path.display(), e))
+}
+
+/// What the frames' errors come to, the worst frame by its own number.
+fn pooled_errors(headless: &Headless, frames: &[FrameStats]) -> Option<PooledErrors> {
+    let pool = headless.pooled_errors()?;
+    let worst = frames.get(usize::try_from(pool.worst_frame()?).ok()?)?;
+    let summary = pool.summary();
+    Some(PooledErrors {
+        error_px_max: summary.error_px_max,
+        error_px_p99: summary.error_px_p99,
+        error_px_rms: summary.error_px_rms,
+        error_m_max: summary.error_m_max,
+        error_floor_px: summary.error_floor_px,
+        worst_frame: worst.frame,
+    })
 }
 
 fn checksum(bytes: &[u8]) -> String {

@@ -27,6 +27,7 @@ pub use collider::{Collider, MAX_COLLIDER_SAMPLES, collider};
 pub use quad::{Quad, Triangle};
 pub use ray::Crossing;
 pub use s0::S0;
+pub use tile::Tiles;
 pub use truth::{Probe, Truth, Under};
 
 use crate::camera::View;

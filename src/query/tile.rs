@@ -82,11 +82,26 @@ impl Tile {
     }
 }
 
-/// Tiles of level 0, read when they are first asked for and kept within a budget.
-pub(super) struct Tiles<'a> {
-    levels: &'a dyn Levels,
+/// Tiles of one DEM, read when they are first asked for and kept within a budget. Clones share them.
+#[derive(Clone)]
+pub struct Tiles {
     budget_bytes: usize,
-    cache: Mutex<Cache>,
+    cache: Arc<Mutex<Cache>>,
+}
+
+impl std::fmt::Debug for Tiles {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Tiles")
+            .field("budget_bytes", &self.budget_bytes)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Default for Tiles {
+    /// With room for 256 MiB, about the tiles of 35 million samples.
+    fn default() -> Self {
+        Self::new(256 << 20)
+    }
 }
 
 #[derive(Default)]
@@ -96,12 +111,12 @@ struct Cache {
     clock: u64,
 }
 
-impl<'a> Tiles<'a> {
-    pub(super) fn new(levels: &'a dyn Levels, budget_bytes: usize) -> Self {
+impl Tiles {
+    /// None yet; one is kept whatever the budget.
+    pub fn new(budget_bytes: usize) -> Self {
         Self {
-            levels,
             budget_bytes,
-            cache: Mutex::default(),
+            cache: Arc::default(),
         }
     }
 
@@ -111,13 +126,12 @@ impl<'a> Tiles<'a> {
     }
 
     /// The bytes that are held.
-    #[cfg(test)]
-    pub(super) fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         self.cache().bytes
     }
 
-    /// Tile (x, z), which must have a quad of the DEM.
-    pub(super) fn tile(&self, key: [i64; 2]) -> Result<Arc<Tile>> {
+    /// Tile (x, z) of `levels`, which must have a quad of the DEM.
+    pub(super) fn tile(&self, levels: &dyn Levels, key: [i64; 2]) -> Result<Arc<Tile>> {
         {
             let mut cache = self.cache();
             cache.clock += 1;
@@ -128,7 +142,7 @@ impl<'a> Tiles<'a> {
             }
         }
         // Read without the lock: two threads may now and then read the same, but none waits for another's disk.
-        let tile = Arc::new(self.read(key)?);
+        let tile = Arc::new(read(levels, key)?);
         let mut cache = self.cache();
         cache.clock += 1;
         let now = cache.clock;
@@ -145,23 +159,22 @@ impl<'a> Tiles<'a> {
         }
         Ok(tile)
     }
+}
 
-    fn read(&self, [x, z]: [i64; 2]) -> Result<Tile> {
-        let (x0, z0) = (x * TILE, z * TILE);
-        let rect =
-            Rect::new(x0, z0, x0 + TILE + 1, z0 + TILE + 1).intersection(self.levels.grid().size.rect());
-        let mut read = vec![0.0; rect.area() as usize];
-        arrived(self.levels.heights(0, rect, &mut read)?)?;
-        let mut heights = vec![f32::NAN; SAMPLES * SAMPLES];
-        let rows = read.chunks_exact(rect.width().max(1) as usize);
-        for (row, out) in rows.zip(heights.chunks_exact_mut(SAMPLES)) {
-            for (height, out) in row.iter().zip(out) {
-                // Infinities are no data, whatever the source says.
-                if height.is_finite() {
-                    *out = *height;
-                }
+fn read(levels: &dyn Levels, [x, z]: [i64; 2]) -> Result<Tile> {
+    let (x0, z0) = (x * TILE, z * TILE);
+    let rect = Rect::new(x0, z0, x0 + TILE + 1, z0 + TILE + 1).intersection(levels.grid().size.rect());
+    let mut read = vec![0.0; rect.area() as usize];
+    arrived(levels.heights(0, rect, &mut read)?)?;
+    let mut heights = vec![f32::NAN; SAMPLES * SAMPLES];
+    let rows = read.chunks_exact(rect.width().max(1) as usize);
+    for (row, out) in rows.zip(heights.chunks_exact_mut(SAMPLES)) {
+        for (height, out) in row.iter().zip(out) {
+            // Infinities are no data, whatever the source says.
+            if height.is_finite() {
+                *out = *height;
             }
         }
-        Ok(Tile::new(heights))
     }
+    Ok(Tile::new(heights))
 }

@@ -31,9 +31,6 @@ use crate::error::Result;
 use crate::grid::{Grid, PATCH, Patch, Rect};
 use crate::levels::Levels;
 
-/// Bytes of tiles that are kept by default, about: 100 million samples' worth.
-const BUDGET_BYTES: usize = 256 << 20;
-
 /// The level whose patches are tiles.
 const TILE_LEVEL: u32 = TILE_RANK - PATCH.ilog2();
 
@@ -44,7 +41,7 @@ const REMEMBERED: i64 = 8;
 pub struct Truth<'a> {
     s0: S0<'a>,
     levels: &'a dyn Levels,
-    tiles: Tiles<'a>,
+    tiles: Tiles,
 }
 
 impl std::fmt::Debug for Truth<'_> {
@@ -58,12 +55,17 @@ impl std::fmt::Debug for Truth<'_> {
 impl<'a> Truth<'a> {
     /// Level 0 of `levels`, which must be a source that waits for its data, with a factor on heights relative to the eye.
     ///
-    /// It keeps 256 MiB of tiles at most, and each [`Probe`] the 64 that it asked for last (28 MB).
+    /// It keeps 256 MiB of [`Tiles`] at most, and each [`Probe`] the 64 that it asked for last (28 MB).
     pub fn new(levels: &'a dyn Levels, vertical_scale: f64) -> Self {
+        Self::with_tiles(levels, vertical_scale, &Tiles::default())
+    }
+
+    /// The same, with tiles that an earlier truth of the same levels has read.
+    pub fn with_tiles(levels: &'a dyn Levels, vertical_scale: f64, tiles: &Tiles) -> Self {
         Self {
             s0: S0::new(levels).with_vertical_scale(vertical_scale),
             levels,
-            tiles: Tiles::new(levels, BUDGET_BYTES),
+            tiles: tiles.clone(),
         }
     }
 
@@ -254,7 +256,7 @@ fn tile<'t>(
     let slot = &mut remembered[(z * REMEMBERED + x) as usize];
     let tile = match slot.take() {
         Some((last, tile)) if last == key => tile,
-        _ => truth.tiles.tile(key)?,
+        _ => truth.tiles.tile(truth.levels, key)?,
     };
     Ok(&slot.insert((key, tile)).1)
 }
@@ -392,5 +394,88 @@ impl Under {
             triangle: Triangle::holding(self.at),
             wall: false,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use crate::progress::Silent;
+    use crate::pyramid::random::Random;
+    use crate::pyramid::{Filter, Pyramid};
+    use crate::work::Serial;
+    use glam::DVec3;
+
+    #[test]
+    fn a_small_cache_stays_small_and_changes_nothing() {
+        let grid = Grid::new(2300, 900, [1.0, 1.0]);
+        let mut random = Random::new(6);
+        let heights = random.heights(2300 * 900, 0.0, 100.0, 0.1);
+        let mut pyramid = Pyramid::new(grid, heights, None, &Filter::default(), &Serial, &Silent).unwrap();
+        pyramid.bound(&Serial, &Silent).unwrap();
+        let roomy = Truth::new(&pyramid, 1.0);
+        let tight = Truth::with_tiles(&pyramid, 1.0, &Tiles::new(500_000)); // one tile
+        let camera = Camera {
+            eye: DVec3::new(1000.0, 160.0, 400.0),
+            heading_deg: 70.0,
+            pitch_deg: -20.0,
+            roll_deg: 0.0,
+            fov_deg: 100.0,
+        };
+        let view = View::new(camera, [64, 64]).unwrap();
+        let mut seen = 0;
+        let [mut a, mut b] = [&roomy, &tight].map(|truth| Probe::new(truth, &view).unwrap());
+        for _ in 0..3000 {
+            let pixel = [random.between(0.0, 64.0), random.between(0.0, 64.0)];
+            let [hit, other] = [&mut a, &mut b].map(|probe| probe.cast(pixel).unwrap());
+            assert_eq!(hit.map(|h| (h.along, h.cell)), other.map(|h| (h.along, h.cell)));
+            seen += u32::from(hit.is_some());
+            assert!(tight.tiles.bytes() <= 500_000);
+        }
+        assert!(seen > 1000 && roomy.tiles.bytes() > 4_000_000, "{seen}");
+    }
+
+    #[test]
+    fn a_place_is_over_its_quad_up_to_the_edges() {
+        let grid = Grid {
+            base_m: 20.0,
+            ..Grid::new(300, 270, [2.0, 3.0])
+        };
+        let heights = grid
+            .size
+            .rect()
+            .cells()
+            .map(|(i, j)| (i * 7 % 31 - j * 5 % 17) as f32)
+            .collect();
+        let pyramid = Pyramid::new(grid, heights, None, &Filter::default(), &Serial, &Silent).unwrap();
+        let truth = Truth::new(&pyramid, 1.0);
+        let camera = Camera {
+            eye: DVec3::new(100.25, 50.0, 200.5),
+            heading_deg: 0.0,
+            pitch_deg: 0.0,
+            roll_deg: 0.0,
+            fov_deg: 60.0,
+        };
+        let mut probe = Probe::new(&truth, &View::new(camera, [8, 8]).unwrap()).unwrap();
+        let mut random = Random::new(7);
+        let mut at = |x: f64, z: f64| {
+            probe
+                .under([x - 100.25, z - 200.5])
+                .unwrap()
+                .and_then(|u| u.height_m())
+        };
+        for _ in 0..2000 {
+            let (x, z) = (random.between(-5.0, 605.0), random.between(-5.0, 815.0));
+            let want = truth.plain().height_at(x, z).unwrap().map(|h| h - 20.0);
+            let got = at(x, z);
+            assert_eq!(got.is_some(), want.is_some(), "{x} {z}");
+            assert!(
+                got.zip(want).is_none_or(|(a, b)| (a - b).abs() < 1e-9),
+                "{x} {z}: {got:?} {want:?}"
+            );
+        }
+        assert!(at(598.0, 807.0).is_some() && at(0.0, 0.0).is_some());
+        assert!(at(598.001, 3.0).is_none() && at(3.0, -0.001).is_none() && at(f64::NAN, 3.0).is_none());
     }
 }

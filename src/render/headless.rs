@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
-use super::crack_pass::CrackPass;
+use super::error_view::colour_errors;
+use super::measuring::{Measured, MeasuringPass};
+use crate::accuracy::ErrorPool;
 use crate::camera::{View, check_picture};
 use crate::clipmap::{Clipmap, ClipmapOptions, UpdateReport};
 use crate::error::{Error, ErrorKind, Result};
@@ -58,8 +60,8 @@ pub struct Frame {
     pub gpu_ms: Option<f64>,
     /// All of it, reading back included, measuring not.
     pub frame_ms: f64,
-    /// Pixels that see through the drawn surface, where that is measured, see [`Headless::measure`].
-    pub cracks: Option<u64>,
+    /// Its errors and cracks, where they are measured, see [`Headless::measure`].
+    pub measured: Option<Measured>,
 }
 
 /// Draws frames of one terrain into memory.
@@ -73,7 +75,9 @@ pub struct Headless {
     textures: ViewTextures,
     targets: Targets,
     timer: Option<Timer>,
-    crack_pass: Option<CrackPass>,
+    measuring: Option<MeasuringPass>,
+    pool: Option<ErrorPool>,
+    frames: u64,
 }
 
 #[derive(Debug)]
@@ -116,7 +120,12 @@ impl Headless {
             sky: SkyRenderer::new(&gpu.device, &renderer_options)?,
             targets: Targets::new(&gpu.device, options, &renderer_options),
             timer: gpu.has_timestamps().then(|| Timer::new(&gpu)),
-            crack_pass: None,
+            // The errors that this view shows are measured.
+            measuring: (options.view_mode == ViewMode::Error)
+                .then(|| MeasuringPass::new(&gpu, options))
+                .transpose()?,
+            pool: None,
+            frames: 0,
             gpu,
             options: *options,
             clipmap,
@@ -162,17 +171,11 @@ impl Headless {
         self.gpu.queue.submit([encoder.finish()]);
         self.wait()?;
         let drawn = Instant::now();
-        let rgba8 = self.gpu.read_texture(&self.targets.colour, 0)?;
+        let mut rgba8 = self.gpu.read_texture(&self.targets.colour, 0)?;
         let gpu_ms = self.timer.as_ref().map(|t| t.read_ms(&self.gpu)).transpose()?;
         let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
         let frame_ms = ms(start, Instant::now());
-        let cracks = match &self.crack_pass {
-            None => None,
-            Some(pass) => {
-                let depth = &self.targets.depth;
-                Some(pass.count(&self.gpu, &self.clipmap, &self.textures, depth, view)?)
-            }
-        };
+        let measured = self.measured(levels, view, &mut rgba8)?;
         Ok(Frame {
             rgba8,
             update,
@@ -183,17 +186,47 @@ impl Headless {
             draw_ms: ms(uploaded, drawn),
             gpu_ms,
             frame_ms,
-            cracks,
+            measured,
         })
     }
 
-    /// Measures every frame from now on: [`Frame::cracks`], from a second pass where there are several samples a pixel.
+    /// Measures every frame from now on: [`Frame::measured`], from a second pass where there are several samples a pixel.
+    /// Levels must wait for their data.
     ///
     /// # Errors
     /// [`ErrorKind::Limit`] where the system starts no threads.
     pub fn measure(&mut self) -> Result<()> {
-        self.crack_pass = Some(CrackPass::new(&self.gpu, &self.options)?);
+        if self.measuring.is_none() {
+            self.measuring = Some(MeasuringPass::new(&self.gpu, &self.options)?);
+        }
+        self.pool = Some(ErrorPool::default());
+        self.frames = 0;
         Ok(())
+    }
+
+    /// The errors of all frames since [`Headless::measure`], numbered from 0; none without it.
+    pub fn pooled_errors(&self) -> Option<&ErrorPool> {
+        self.pool.as_ref()
+    }
+
+    /// Measures the frame just drawn, as far as that was asked for, and lays its errors over its picture where those
+    /// are what is shown.
+    fn measured(&mut self, levels: &dyn Levels, view: &View, rgba8: &mut [u8]) -> Result<Option<Measured>> {
+        let Some(pass) = &self.measuring else {
+            return Ok(None);
+        };
+        let depths = pass.depths(&self.gpu, &self.clipmap, &self.textures, &self.targets.depth)?;
+        let errors = pass.errors(levels, &self.clipmap, view, &depths)?;
+        if self.options.view_mode == ViewMode::Error {
+            colour_errors(&errors, rgba8);
+        }
+        let Some(pool) = &mut self.pool else {
+            return Ok(None);
+        };
+        pool.add(self.frames, &errors);
+        self.frames += 1;
+        let cracks = pass.cracks(&self.clipmap, view, &depths)?;
+        Ok(Some(Measured { errors, cracks }))
     }
 
     fn record(&self, encoder: &mut wgpu::CommandEncoder) -> Result<DrawReport> {

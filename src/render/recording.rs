@@ -165,6 +165,7 @@ fn folder_error(folder: &Path, error: std::io::Error) -> Error {
 }
 
 fn frame_stats(frame: &Frame, k: u64, t_s: f64, camera: &Camera) -> FrameStats {
+    let errors = frame.measured.as_ref().map(|m| m.errors.summary);
     FrameStats {
         frame: k,
         t_s,
@@ -186,6 +187,12 @@ fn frame_stats(frame: &Frame, k: u64, t_s: f64, camera: &Camera) -> FrameStats {
         cut: frame.update.cut,
         stale_levels: frame.update.stale_levels,
         pops: frame.update.pops,
-        cracks: frame.cracks,
+        error_px_max: errors.map(|e| e.error_px_max),
+        error_px_p99: errors.map(|e| e.error_px_p99),
+        error_px_rms: errors.map(|e| e.error_px_rms),
+        error_m_max: errors.map(|e| e.error_m_max),
+        error_floor_px: errors.map(|e| e.error_floor_px),
+        cracks: frame.measured.as_ref().map(|m| m.cracks),
+        silhouette_px: errors.map(|e| e.silhouette_px),
     }
 }

@@ -63,8 +63,9 @@ pub(in crate::cli) struct RenderArgs {
     #[command(flatten)]
     pub(in crate::cli) view: ViewArgs,
 
-    /// Check every drawn frame, and say in --stats how many pixels see through the drawn surface (cracks); takes a
-    /// while, and needs --stats
+    /// Measure every drawn frame against the DEM's own surface, and say in --stats how far off it is on the screen and in
+    /// metres (error_*), how many pixels see through the drawn surface (cracks), and at how many the two disagree about
+    /// being terrain (silhouette_px); takes a while, and needs --stats
     #[arg(long, requires = "stats")]
     pub(in crate::cli) measure: bool,
 
@@ -115,7 +116,9 @@ pub(in crate::cli) struct ViewArgs {
     #[arg(long, value_name = "AZIMUTH,ALTITUDE", value_parser = values::sun, allow_hyphen_values = true)]
     pub(in crate::cli) sun: Option<Sun>,
 
-    /// What is shown: shaded, light (the bare light), level (levels, their bands, what is held back), or wire (triangles)
+    /// What is shown: shaded, light (the bare light), level (levels, their bands, what is held back), wire (triangles), or
+    /// error (how far each pixel is off the DEM's own surface: grey 0, blue above 0, cyan 0.25, green 0.5, yellow 1, red
+    /// 2 pixels and more; magenta where the two disagree about being terrain)
     #[arg(long, value_name = "VIEW", value_parser = view_values::view, default_value = "shaded")]
     pub(in crate::cli) view: ViewMode,
 

@@ -1,25 +1,38 @@
-//! Counts the cracks of a frame: its depths, one a pixel, against the surface that it draws.
+//! Measures frames: their depths, one a pixel, against the surface that they draw (cracks) and against `S0` (errors).
 
 use super::headless::{COLOUR_FORMAT, HeadlessOptions};
-use crate::accuracy::{DepthImage, cracks};
+use crate::accuracy::{DepthImage, FrameErrors, cracks, measure};
 use crate::build::Threads;
 use crate::camera::View;
 use crate::clipmap::{Clipmap, Drawn};
 use crate::error::Result;
 use crate::gpu::{ClipmapRenderer, Gpu, RendererOptions, ViewTextures};
+use crate::levels::Levels;
+use crate::query::{Tiles, Truth};
 use crate::shade::ViewMode;
 
-/// What counting takes beside the frame's own state.
-pub(super) struct CrackPass {
+/// What was measured of a frame.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// Its errors, pixel by pixel and summed up.
+    pub errors: FrameErrors,
+    /// Pixels that see through the drawn surface.
+    pub cracks: u64,
+}
+
+/// What measuring takes beside the frame's own state.
+pub(super) struct MeasuringPass {
     threads: Threads,
+    tiles: Tiles,
     /// For frames of several samples a pixel: a second pass of one.
     single: Option<SinglePass>,
 }
 
-impl std::fmt::Debug for CrackPass {
+impl std::fmt::Debug for MeasuringPass {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("CrackPass")
+        f.debug_struct("MeasuringPass")
             .field("threads", &self.threads.count())
+            .field("tiles", &self.tiles)
             .field("single", &self.single)
             .finish()
     }
@@ -32,7 +45,7 @@ struct SinglePass {
     depth: wgpu::Texture,
 }
 
-impl CrackPass {
+impl MeasuringPass {
     /// For frames as in `options`.
     ///
     /// # Errors
@@ -40,24 +53,25 @@ impl CrackPass {
     pub(super) fn new(gpu: &Gpu, options: &HeadlessOptions) -> Result<Self> {
         Ok(Self {
             threads: Threads::new(0)?,
+            tiles: Tiles::default(),
             single: (options.sample_count != 1)
                 .then(|| SinglePass::new(gpu, options.size_px))
                 .transpose()?,
         })
     }
 
-    /// The cracks of the frame that `textures` hold; `depth` is its depth texture, if it has one sample a pixel.
+    /// Draws the frame that `textures` hold once more, if its depth has several samples a pixel, and reads its depths
+    /// back; `depth` is its own depth texture.
     ///
     /// # Errors
     /// [`crate::ErrorKind::Device`] where the device failed.
-    pub(super) fn count(
+    pub(super) fn depths(
         &self,
         gpu: &Gpu,
         clipmap: &Clipmap,
         textures: &ViewTextures,
         depth: &wgpu::Texture,
-        view: &View,
-    ) -> Result<u64> {
+    ) -> Result<Vec<f32>> {
         let depth = match &self.single {
             None => depth,
             Some(single) => {
@@ -65,8 +79,30 @@ impl CrackPass {
                 &single.depth
             }
         };
-        let depths: Vec<f32> = bytemuck::pod_collect_to_vec(&gpu.read_texture(depth, 0)?);
-        let image = DepthImage::new(&depths, view)?;
+        Ok(bytemuck::pod_collect_to_vec(&gpu.read_texture(depth, 0)?))
+    }
+
+    /// Errors of a frame of `levels`, from its depths.
+    ///
+    /// # Errors
+    /// Those of `levels`.
+    pub(super) fn errors(
+        &self,
+        levels: &dyn Levels,
+        clipmap: &Clipmap,
+        view: &View,
+        depths: &[f32],
+    ) -> Result<FrameErrors> {
+        let truth = Truth::with_tiles(levels, clipmap.vertical_scale(), &self.tiles);
+        measure(&truth, &DepthImage::new(depths, view)?, &self.threads)
+    }
+
+    /// Cracks of a frame, from its depths.
+    ///
+    /// # Errors
+    /// Those of [`cracks()`].
+    pub(super) fn cracks(&self, clipmap: &Clipmap, view: &View, depths: &[f32]) -> Result<u64> {
+        let image = DepthImage::new(depths, view)?;
         Ok(cracks(&Drawn::new(clipmap)?, &image, &self.threads)?.len() as u64)
     }
 }
