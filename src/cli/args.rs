@@ -1,12 +1,16 @@
 //! What may be typed: commands, their options, and the help of each.
 
 #[cfg(feature = "gpu")]
+mod measure;
+#[cfg(feature = "gpu")]
 mod render;
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+#[cfg(feature = "gpu")]
+pub(super) use self::measure::MeasureArgs;
 #[cfg(feature = "gpu")]
 pub(super) use self::render::{RenderArgs, ViewArgs};
 use super::values;
@@ -33,6 +37,8 @@ pub(super) enum Command {
     Preprocess(PreprocessArgs),
     #[cfg(feature = "gpu")]
     Render(Box<RenderArgs>),
+    #[cfg(feature = "gpu")]
+    Measure(Box<MeasureArgs>),
     #[cfg(feature = "dem")]
     Synth(SynthArgs),
 }
