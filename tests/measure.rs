@@ -118,7 +118,7 @@ fn the_files_agree_and_nothing_is_replaced_unless_forced() {
     for line in summary["stability"].as_array().unwrap() {
         assert_eq!(line["holds"], true, "{line}");
     }
-    assert_eq!(summary["stability"].as_array().unwrap().len(), 15);
+    assert_eq!(summary["stability"].as_array().unwrap().len(), 22);
     let costs = summary["storage"].as_array().unwrap();
     assert_eq!(costs[0]["change_m_max"], 0.0);
     assert!(costs[1]["change_m_max"].as_f64() > Some(0.0));

@@ -121,8 +121,12 @@ impl Page<'_> {
                 number(row.errors.error_px_max),
                 number(row.errors.error_px_p99),
                 match row.certified_error_px {
-                    Some(px) if px <= limit_px => format!(", certified beforehand to {} px", number(px)),
-                    Some(px) => format!(", of which {} px is certified beforehand", number(px)),
+                    Some(px) if px <= limit_px =>
+                        format!("; {} px were certified before drawing", number(px)),
+                    Some(px) => format!(
+                        "; before drawing no less than {} px could be certified",
+                        number(px)
+                    ),
                     None => String::new(),
                 }
             ),
@@ -148,14 +152,15 @@ impl Page<'_> {
         section(text, "Triangles against error");
         text.push_str(
             "<p>The same without the clock: triangles do not depend on the machine. The error here is the one that 99 of \
-             100 pixels do not exceed.</p>\n",
+             100 pixels do not exceed; 0 lies on the lower edge.</p>\n",
         );
         text.push_str(&plots::triangles_against_error(self.rows));
         if let Some(plot) = plots::measured_against_certified(self.rows) {
             section(text, "What was certified against what was measured");
             text.push_str(
                 "<p>Each setting's greatest error over the flight, certified before drawing and measured afterwards. No \
-                 mark may lie above the line, on which both are equal.</p>\n",
+                 mark may lie above the line, on which both are equal. Where a promise is less than a clip size can keep, what \
+                 is certified says so.</p>\n",
             );
             text.push_str(&plot);
         }

@@ -4,6 +4,7 @@
 //! with controls that break each line on purpose, is the test program `extremes`; this one takes seconds and runs on the
 //! device that the rest of the report was measured on. All DEMs and cameras follow from [`SEED`].
 
+mod extremes;
 mod ground;
 mod numbers;
 mod pictures;
@@ -53,12 +54,18 @@ impl Comparison {
 /// [`crate::ErrorKind::Cancelled`]; [`crate::ErrorKind::Device`] where the device fails.
 pub fn compare(gpu: &Gpu, progress: &dyn Progress) -> Result<Vec<Comparison>> {
     type Step = fn(&Gpu) -> Result<Comparison>;
-    const STEPS: [Step; 15] = [
+    const STEPS: [Step; 22] = [
         |gpu| pictures::shift(gpu),
         |gpu| pictures::scale(gpu),
         |gpu| pictures::culling(gpu),
         |gpu| pictures::history(gpu),
         |gpu| pictures::metre_on_ten_million(gpu),
+        |gpu| extremes::heights(gpu),
+        |gpu| extremes::sizes(gpu),
+        |gpu| extremes::eyes(gpu),
+        |gpu| extremes::views(gpu),
+        |gpu| extremes::parameters(gpu),
+        |gpu| extremes::motion(gpu),
         |gpu| pictures::cracks(gpu),
         |gpu| pictures::certificate(gpu),
         |_| numbers::twin_heights(),
@@ -69,6 +76,7 @@ pub fn compare(gpu: &Gpu, progress: &dyn Progress) -> Result<Vec<Comparison>> {
         |_| numbers::large_heights(),
         |_| numbers::white_noise(),
         |_| numbers::bounds(),
+        |_| numbers::suns(),
     ];
     progress.begin("stability", STEPS.len() as u64);
     let mut lines = Vec::new();
@@ -104,6 +112,7 @@ mod tests {
             numbers::large_heights(),
             numbers::white_noise(),
             numbers::bounds(),
+            numbers::suns(),
         ] {
             let line = line.unwrap();
             assert!(line.holds(), "{line:?}");

@@ -267,7 +267,8 @@ impl Plot {
             ];
             let boxed = |[x, y]: [f64; 2]| [x, y - 11.0, x + width, y + 3.0];
             let free = |b: &[f64; 4]| {
-                let inside = b[0] >= LEFT && b[2] <= WIDTH - 2.0 && b[1] >= 0.0 && b[3] <= HEIGHT - BOTTOM;
+                let inside =
+                    b[0] >= LEFT && b[2] <= WIDTH - RIGHT + 12.0 && b[1] >= 0.0 && b[3] <= HEIGHT - BOTTOM;
                 inside
                     && taken
                         .iter()

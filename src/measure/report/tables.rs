@@ -181,7 +181,15 @@ pub(super) fn settings(rows: &[Row]) -> String {
 /// The comparisons of numerical stability.
 pub(super) fn stability(lines: &[Comparison]) -> String {
     let line = |line: &Comparison| {
-        let found = format!("{} {}", number(line.largest), line.unit);
+        let exact = |value: f64| {
+            let text = if value < 1e5 && value.fract() == 0.0 {
+                format!("{value}")
+            } else {
+                number(value)
+            };
+            format!("{text} {}", line.unit)
+        };
+        let found = exact(line.largest);
         let cells = vec![
             text(line.what.clone()),
             text(line.compared.clone()),
@@ -190,7 +198,7 @@ pub(super) fn stability(lines: &[Comparison]) -> String {
             } else {
                 Cell::Markup(format!("<span class=\"fails\">{}</span>", escape(&found)))
             },
-            Cell::Number(format!("{} {}", number(line.allowed), line.unit)),
+            Cell::Number(exact(line.allowed)),
         ];
         ("", cells)
     };

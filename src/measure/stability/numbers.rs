@@ -1,12 +1,17 @@
 //! Comparisons of numbers: displaced vertices against f64, planes and extreme heights in the pyramid, bounds.
 
+use glam::DVec3;
+
 use super::Comparison;
 use super::ground::{camera, hash, noise, pyramid, pyramid_with, rough};
 use crate::camera::View;
 use crate::clipmap::{Clipmap, ClipmapOptions, Eye, displace};
 use crate::error::Result;
 use crate::grid::{Grid, Rect};
+use crate::light::{Sun, sun_share};
+use crate::progress::Silent;
 use crate::pyramid::{FilterKind, Pyramid};
+use crate::work::Serial;
 
 /// Half a unit in the last place of an f32, over its value.
 const HALF_ULP: f64 = 1.0 / (1u64 << 24) as f64;
@@ -274,6 +279,50 @@ pub(super) fn bounds() -> Result<Comparison> {
         share,
         1.0,
         "of the bound",
+    ))
+}
+
+/// The sun's light on a tilted plane against `normal . sun`, suns at the zenith, along a row, a column and a diagonal, and
+/// below the horizon. Normals and suns are rounded to f32 once each.
+pub(super) fn suns() -> Result<Comparison> {
+    let grid = Grid::new(90, 70, [30.0, 20.0]);
+    let [east, south] = [0.25, -0.125]; // rise over run
+    let plane = |(i, j): (i64, i64)| (east * 30.0 * i as f64 + south * 20.0 * j as f64) as f32;
+    let heights: Vec<f32> = grid.size.rect().cells().map(plane).collect();
+    let normal = DVec3::new(-east, 1.0, -south).normalize();
+    let mut worst = 0.0f64;
+    let mut count = 0;
+    for (azimuth_deg, altitude_deg) in [
+        (0.0, 90.0),
+        (90.0, 45.0),
+        (180.0, 60.0),
+        (315.0, 45.0),
+        (135.0, -5.0),
+        (0.0, -90.0),
+    ] {
+        let sun = Sun {
+            azimuth_deg,
+            altitude_deg,
+        };
+        let lit = if altitude_deg > 0.0 {
+            normal.dot(DVec3::from_array(sun.direction()))
+        } else {
+            0.0
+        };
+        for share in sun_share(&heights, &grid, sun, &Serial, &Silent)? {
+            worst = worst.max((f64::from(share) - lit).abs());
+            count += 1;
+        }
+    }
+    let compared = format!(
+        "light of {count} samples of a tilted plane, suns at 90, 60, 45, -5 and -90 degrees, against the closed form"
+    );
+    Ok(Comparison::new(
+        "suns along rows, columns, diagonals, below the horizon",
+        compared,
+        worst,
+        8.0 * HALF_ULP,
+        "of full light",
     ))
 }
 

@@ -28,7 +28,7 @@ type Field = (fn(i64, i64) -> f32, [f64; 2]);
 
 const FIELDS: [Field; 2] = [(rough, [-400.0, 460.0]), (noise, [0.0, 9000.0])];
 
-fn options(cull: bool, look: bool) -> HeadlessOptions {
+pub(super) fn options(cull: bool, look: bool) -> HeadlessOptions {
     HeadlessOptions {
         size_px: SIZE_PX,
         sample_count: 1,
@@ -46,14 +46,14 @@ fn options(cull: bool, look: bool) -> HeadlessOptions {
 }
 
 /// Colours and depths of a picture.
-type Picture = (Vec<u8>, Vec<f32>);
+pub(super) type Picture = (Vec<u8>, Vec<f32>);
 
 fn draw(headless: &mut Headless, levels: &dyn Levels, camera: &Camera) -> Result<Picture> {
     let colours = headless.frame(levels, camera, 0.0)?.rgba8;
     Ok((colours, headless.read_depth()?))
 }
 
-fn pictures(
+pub(super) fn pictures(
     gpu: &Gpu,
     levels: &dyn Levels,
     options: &HeadlessOptions,
@@ -67,7 +67,7 @@ fn pictures(
 }
 
 /// Pixels that differ in any bit.
-fn differing(a: &[Picture], b: &[Picture]) -> usize {
+pub(super) fn differing(a: &[Picture], b: &[Picture]) -> usize {
     let pixel = |picture: &Picture, k: usize| {
         let colour: [u8; 4] = std::array::from_fn(|c| picture.0[4 * k + c]);
         (colour, picture.1[k].to_bits())
