@@ -1,7 +1,11 @@
-//! The look: its constants, emitted into WGSL, and the twin of the fragment stage's colours.
+//! The look: its constants, emitted into WGSL, and the twin of the fragment stage's colours ([`Fragment`]).
 //!
 //! Colours are linear RGB radiance for a white surface of 1, before exposure. The air follows Beer and Lambert with a
 //! density that falls exponentially with height, integrated in closed form along the ray.
+
+mod fragment;
+
+pub use fragment::{Fragment, SurfacePoint, encode8, tone};
 
 use std::fmt::Write;
 

@@ -21,12 +21,19 @@ impl ExactImage {
     /// [`crate::ErrorKind::Misuse`] for a view of other than finite numbers; those of reading.
     pub fn new(truth: &Truth<'_>, view: &View, work: &dyn Work) -> Result<Self> {
         let mut distances_m = vec![f64::INFINITY; view.size_px.iter().map(|&n| n as usize).product()];
-        each_row(truth, view, work, &mut distances_m, |probe, pixel, out| {
-            if let Some(hit) = probe.cast(pixel)? {
-                *out = hit.along;
-            }
-            Ok(())
-        })?;
+        each_row(
+            truth,
+            view,
+            work,
+            &mut distances_m,
+            || (),
+            |probe, (), pixel, out| {
+                if let Some(hit) = probe.cast(pixel)? {
+                    *out = hit.along;
+                }
+                Ok(())
+            },
+        )?;
         Ok(Self {
             distances_m,
             view: *view,
@@ -44,21 +51,22 @@ impl ExactImage {
     }
 }
 
-/// Fills `out`, an element a pixel of `view`, row by row on all of `work`, with a probe for each row; `pixel` gets the
-/// place of a pixel's centre.
-pub(super) fn each_row<T: Send>(
+/// Fills `out`, an element a pixel of `view`, row by row on all of `work`, with a probe and what `memory` makes for each
+/// row; `pixel` gets the place of a pixel's centre.
+pub(super) fn each_row<T: Send, M>(
     truth: &Truth<'_>,
     view: &View,
     work: &dyn Work,
     out: &mut [T],
-    pixel: impl Fn(&mut Probe<'_>, [f64; 2], &mut T) -> Result<()> + Sync,
+    memory: impl Fn() -> M + Sync,
+    pixel: impl Fn(&mut Probe<'_>, &mut M, [f64; 2], &mut T) -> Result<()> + Sync,
 ) -> Result<()> {
     let failed = Mutex::new(None::<Error>);
     each_chunk(work, out, view.size_px[0] as usize, |y, row| {
         let fill = |row: &mut [T]| -> Result<()> {
-            let mut probe = Probe::new(truth, view)?;
+            let (mut probe, mut memory) = (Probe::new(truth, view)?, memory());
             for (x, out) in row.iter_mut().enumerate() {
-                pixel(&mut probe, [x as f64 + 0.5, y as f64 + 0.5], out)?;
+                pixel(&mut probe, &mut memory, [x as f64 + 0.5, y as f64 + 0.5], out)?;
             }
             Ok(())
         };

@@ -78,11 +78,18 @@ pub struct ErrorSummary {
 pub fn measure(truth: &Truth<'_>, image: &DepthImage<'_>, work: &dyn Work) -> Result<FrameErrors> {
     let view = image.view();
     let mut pixels = vec![PixelError::default(); view.size_px.iter().map(|&n| n as usize).product()];
-    each_row(truth, view, work, &mut pixels, |probe, pixel, out| {
-        let depth = image.row(pixel[1] as u32)[pixel[0] as usize];
-        *out = at_pixel(truth, probe, view, pixel, f64::from(depth))?;
-        Ok(())
-    })?;
+    each_row(
+        truth,
+        view,
+        work,
+        &mut pixels,
+        || (),
+        |probe, (), pixel, out| {
+            let depth = image.row(pixel[1] as u32)[pixel[0] as usize];
+            *out = at_pixel(truth, probe, view, pixel, f64::from(depth))?;
+            Ok(())
+        },
+    )?;
     let summary = ErrorSummary::of(&pixels);
     Ok(FrameErrors { pixels, summary })
 }

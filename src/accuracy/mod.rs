@@ -2,19 +2,24 @@
 //!
 //! A [`DepthImage`] is what the device left. [`cracks()`] counts the pixels that see through the drawn surface; what f32
 //! and the rasteriser's grid may do to a depth is stated, and derived, by [`Facet`]. [`measure`] compares each drawn point
-//! with `S0`, pixel by pixel, and an [`ErrorPool`] takes frames together. [`ExactImage`] is what should have been drawn.
+//! with `S0`, pixel by pixel, and an [`ErrorPool`] takes frames together. [`ExactImage`] is what should have been
+//! drawn, and [`Shading`] its picture.
 
 mod cracks;
 mod exact;
 mod facet;
+mod foreign;
 mod measured;
 mod pool;
+mod shaded;
 
 pub use cracks::cracks;
 pub use exact::ExactImage;
 pub use facet::{Facet, INTERPOLATION, RASTER_PX, ROUNDING};
+pub use foreign::{Distances, parse_camera};
 pub use measured::{ErrorSummary, FrameErrors, PixelError, measure};
 pub use pool::{ErrorPool, RESOLUTION};
+pub use shaded::{Look, Shading, psnr_db};
 
 use crate::camera::View;
 use crate::error::{Error, ErrorKind, Result};

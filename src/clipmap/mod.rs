@@ -39,6 +39,7 @@ pub use frustum::Frustum;
 pub use held::{FADE_S, HeldField};
 pub use options::{ClipmapOptions, MAX_ERROR_PX, MAX_VERTICAL_SCALE};
 pub use plan::{HEIGHT_BYTES, LIGHT_BYTES, LevelPlan, UpdatePlan, exposed_bytes};
+pub(crate) use relief::light_texels;
 pub use screen::Screen;
 pub use selection::{CLOSER_TRIANGLES, Instance, PATCH_TRIANGLES, Scene, Selection, Side};
 pub use vertex::{Vertex, displace};
@@ -406,7 +407,7 @@ fn no_frame(what: &str) -> Error {
 }
 
 /// The least and greatest height of a DEM, from the saturated bounds of its coarsest level, which are small.
-fn height_range(levels: &dyn Levels) -> Result<[f32; 2]> {
+pub(crate) fn height_range(levels: &dyn Levels) -> Result<[f32; 2]> {
     let coarsest = levels.level_count() - 1;
     let patches = levels.grid().patches(coarsest).rect();
     let mut bounds = vec![Bounds::VOID; patches.area() as usize];

@@ -45,6 +45,18 @@ pub(super) fn read(source: &dyn Levels, level: u32, rect: Rect, scratch: &mut Sc
     Ok(Arrival::Arrived)
 }
 
+/// The light texels of `rect` of level `level`; none where data are missing.
+///
+/// # Errors
+/// Those of `source`.
+pub(crate) fn light_texels(source: &dyn Levels, level: u32, rect: Rect) -> Result<Option<Vec<LightTexel>>> {
+    let mut scratch = Scratch::default();
+    Ok(match read(source, level, rect, &mut scratch)? {
+        Arrival::Arrived => Some(scratch.texels),
+        Arrival::Missing => None,
+    })
+}
+
 /// Reads `rect` of level `level` from the next coarser level into `scratch.texels`: half as fine, where the level's own
 /// data cannot be read.
 pub(super) fn read_coarser(

@@ -209,7 +209,8 @@ impl Page<'_> {
              flown once a round, in turn, so that a machine that slows down slows all. Errors are pooled over all pixels \
              of the measured frames; what the rasteriser's grid and f32 depth could do at a pixel is taken off and \
              reported (<code>error_floor_px</code>). Triangles, bytes and certificates are of every frame of the flight. \
-             Memory is the windows on the processor and their textures on the device, from their sizes. The numbers are in \
+             Memory is the windows on the processor and their textures on the device, from their sizes. PSNR compares \
+             the shaded pictures with pictures of the DEM's own surface, shaded by the same rules. The numbers are in \
              <code>tradeoff.csv</code>, their units in <code>tradeoff.schema.json</code>, checksums and versions in \
              <code>summary.json</code>.</p>",
             escape(self.command)

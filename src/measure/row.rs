@@ -44,6 +44,9 @@ pub struct Row {
     pub uncertified_frames: u64,
     /// Pixels that see through the drawn surface, over the measured frames.
     pub cracks: u64,
+    /// Peak signal to noise ratio of all shaded pictures against the exact ones, in decibels over a peak of 255; none where
+    /// they are equal.
+    pub psnr_db: Option<f64>,
     /// Whether no other setting is both quicker and less wrong.
     pub pareto: bool,
 }
@@ -69,7 +72,7 @@ macro_rules! column {
     };
 }
 
-const COLUMNS: [Column; 30] = [
+const COLUMNS: [Column; 31] = [
     column!(
         "setting",
         "integer",
@@ -263,6 +266,13 @@ const COLUMNS: [Column; 30] = [
         |r| json!(r.errors.silhouette_px)
     ),
     column!(
+        "psnr_db",
+        "number",
+        "dB",
+        "peak signal to noise ratio of all shaded pictures of the measured frames against those of the DEM's own surface; empty where they are equal",
+        |r| json!(r.psnr_db)
+    ),
+    column!(
         "pareto",
         "boolean",
         "",
@@ -347,6 +357,7 @@ pub(super) mod tests {
             certified_error_px: Some(2.0 * error_px),
             uncertified_frames: 0,
             cracks: 0,
+            psnr_db: Some(40.0),
             pareto: false,
         }
     }

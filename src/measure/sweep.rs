@@ -100,12 +100,12 @@ impl Sweep<'_> {
             })
             .collect();
         self.time(&mut cases, progress)?;
-        let scene = Scene::new(self, threads)?;
         let measured = self.effort.measured(self.flight);
+        let scene = Scene::new(self, &measured, threads, progress)?;
         progress.begin("measured frames", (cases.len() * measured.len()) as u64);
         let mut rows = Vec::new();
         for (number, case) in cases.iter_mut().enumerate() {
-            let score = scene.score(self, &case.setting, &measured, progress)?;
+            let score = scene.score(self, &case.setting, progress)?;
             rows.push(self.row(number, case, score, progress)?);
         }
         super::pareto::mark_front(&mut rows);
@@ -188,6 +188,7 @@ impl Sweep<'_> {
             certified_error_px: plan.certified_error_px,
             uncertified_frames: plan.uncertified_frames,
             cracks: score.cracks,
+            psnr_db: score.psnr_db,
             pareto: false,
         })
     }

@@ -18,6 +18,7 @@ mod line;
 mod quad;
 pub mod ray;
 mod s0;
+mod shelf;
 mod tile;
 mod truth;
 
@@ -35,6 +36,7 @@ use crate::clipmap::{Corners, Eye, Place, near_of_m};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Patch, Rect};
 use line::Line;
+pub(crate) use shelf::{Remembered, Shelf};
 
 /// A surface made of patches, which can be asked for heights, normals and rays, by several threads at once.
 pub trait Surface: Sync {

@@ -1,11 +1,11 @@
 //! Level 0 in tiles of 256 x 256 quads, each with the least and greatest heights of ever larger squares of its quads:
 //! of 2 x 2, of 4 x 4, up to the whole tile.
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use super::Quad;
 use super::collider::arrived;
+use super::shelf::Shelf;
 use crate::error::Result;
 use crate::grid::Rect;
 use crate::levels::Levels;
@@ -84,80 +84,39 @@ impl Tile {
 
 /// Tiles of one DEM, read when they are first asked for and kept within a budget. Clones share them.
 #[derive(Clone)]
-pub struct Tiles {
-    budget_bytes: usize,
-    cache: Arc<Mutex<Cache>>,
-}
+pub struct Tiles(Shelf<Tile>);
 
 impl std::fmt::Debug for Tiles {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Tiles")
-            .field("budget_bytes", &self.budget_bytes)
-            .finish_non_exhaustive()
+        f.debug_struct("Tiles").field("bytes", &self.bytes()).finish()
     }
 }
 
 impl Default for Tiles {
-    /// With room for 256 MiB, about the tiles of 35 million samples.
+    /// With room for 256 MiB, the tiles of about 40 million samples.
     fn default() -> Self {
         Self::new(256 << 20)
     }
 }
 
-#[derive(Default)]
-struct Cache {
-    tiles: HashMap<[i64; 2], (Arc<Tile>, u64)>,
-    bytes: usize,
-    clock: u64,
-}
-
 impl Tiles {
     /// None yet; one is kept whatever the budget.
     pub fn new(budget_bytes: usize) -> Self {
-        Self {
-            budget_bytes,
-            cache: Arc::default(),
-        }
-    }
-
-    fn cache(&self) -> MutexGuard<'_, Cache> {
-        // Nothing is done under the lock that could leave it half done.
-        self.cache.lock().unwrap_or_else(PoisonError::into_inner)
+        Self(Shelf::new(budget_bytes))
     }
 
     /// The bytes that are held.
     pub fn bytes(&self) -> usize {
-        self.cache().bytes
+        self.0.bytes()
     }
 
     /// Tile (x, z) of `levels`, which must have a quad of the DEM.
     pub(super) fn tile(&self, levels: &dyn Levels, key: [i64; 2]) -> Result<Arc<Tile>> {
-        {
-            let mut cache = self.cache();
-            cache.clock += 1;
-            let now = cache.clock;
-            if let Some((tile, used)) = cache.tiles.get_mut(&key) {
-                *used = now;
-                return Ok(tile.clone());
-            }
-        }
-        // Read without the lock: two threads may now and then read the same, but none waits for another's disk.
-        let tile = Arc::new(read(levels, key)?);
-        let mut cache = self.cache();
-        cache.clock += 1;
-        let now = cache.clock;
-        cache.bytes += tile.bytes();
-        if let Some((old, _)) = cache.tiles.insert(key, (tile.clone(), now)) {
-            cache.bytes -= old.bytes();
-        }
-        while cache.bytes > self.budget_bytes && cache.tiles.len() > 1 {
-            let oldest = cache.tiles.iter().min_by_key(|(_, (_, used))| *used);
-            let oldest = oldest.map(|(key, _)| *key);
-            if let Some((old, _)) = oldest.and_then(|key| cache.tiles.remove(&key)) {
-                cache.bytes -= old.bytes();
-            }
-        }
-        Ok(tile)
+        self.0.get(key, || {
+            let tile = read(levels, key)?;
+            let bytes = tile.bytes();
+            Ok((tile, bytes))
+        })
     }
 }
 

@@ -19,10 +19,9 @@
 //! Above the tiles the stored bounds of coarser levels are asked for (`Reader::heights` of [`S0`]), so ground over which
 //! rays pass high is never read.
 
-use std::sync::Arc;
-
 use super::line::{Line, Side};
 use super::ray::{Piece, pieces_of_quad, plumb};
+use super::shelf::Remembered;
 use super::tile::{TILE, TILE_RANK, Tile, Tiles};
 use super::{Crossing, Quad, Reader, S0, Surface, Triangle};
 use crate::camera::View;
@@ -33,9 +32,6 @@ use crate::levels::Levels;
 
 /// The level whose patches are tiles.
 const TILE_LEVEL: u32 = TILE_RANK - PATCH.ilog2();
-
-/// Tiles along a side of the square of them that a probe remembers.
-const REMEMBERED: i64 = 8;
 
 /// The surface of a DEM's own samples, for many rays and threads.
 pub struct Truth<'a> {
@@ -109,7 +105,7 @@ pub struct Probe<'a> {
     near_m: f64,
     /// Ranges of squares larger than a tile.
     bounds: Box<dyn Reader + 'a>,
-    remembered: Vec<Option<([i64; 2], Arc<Tile>)>>,
+    remembered: Remembered<Tile>,
 }
 
 impl std::fmt::Debug for Probe<'_> {
@@ -133,7 +129,7 @@ impl<'a> Probe<'a> {
             eye: Eye::new(view.eye, truth.grid()),
             near_m: near_of_m(view, truth.grid()),
             bounds: truth.s0.reader(),
-            remembered: vec![None; (REMEMBERED * REMEMBERED) as usize],
+            remembered: Remembered::new(),
         })
     }
 
@@ -198,8 +194,8 @@ impl<'a> Probe<'a> {
             return Ok(None);
         }
         if patch.level == TILE_LEVEL {
-            let key = [patch.a, patch.b];
-            let tile = tile(self.truth, &mut self.remembered, key)?;
+            let (truth, key) = (self.truth, [patch.a, patch.b]);
+            let tile = self.remembered.get(key, || truth.tiles.tile(truth.levels, key))?;
             return Ok(walk.square(tile, key.map(|k| k * TILE), TILE_RANK, [0; 2], span));
         }
         let half = PATCH << (patch.level - 1);
@@ -235,30 +231,15 @@ impl<'a> Probe<'a> {
             cell[axis] = self.eye.anchor[axis] + whole as i64;
             at[axis] = from_anchor - whole;
         }
-        let key = cell.map(|c| c.div_euclid(TILE));
+        let (truth, key) = (self.truth, cell.map(|c| c.div_euclid(TILE)));
         let [x, z] = cell.map(|c| c.rem_euclid(TILE) as usize);
-        let tile = tile(self.truth, &mut self.remembered, key)?;
+        let tile = self.remembered.get(key, || truth.tiles.tile(truth.levels, key))?;
         Ok(Some(Under {
             quad: tile.quad(x, z),
             cell,
             at,
         }))
     }
-}
-
-/// A tile, by way of those that a probe remembers.
-fn tile<'t>(
-    truth: &Truth<'_>,
-    remembered: &'t mut [Option<([i64; 2], Arc<Tile>)>],
-    key: [i64; 2],
-) -> Result<&'t Tile> {
-    let [x, z] = key.map(|k| k.rem_euclid(REMEMBERED));
-    let slot = &mut remembered[(z * REMEMBERED + x) as usize];
-    let tile = match slot.take() {
-        Some((last, tile)) if last == key => tile,
-        _ => truth.tiles.tile(truth.levels, key)?,
-    };
-    Ok(&slot.insert((key, tile)).1)
 }
 
 /// A ray on its way.

@@ -135,6 +135,7 @@ pub(super) fn settings(rows: &[Row]) -> String {
         "certified px",
         "cracks",
         "silhouette px",
+        "PSNR dB",
     ];
     let mut heads = vec![text("varies"), text("filter")];
     heads.extend(number_heads.map(|h| Cell::Number(h.into())));
@@ -167,6 +168,7 @@ pub(super) fn settings(rows: &[Row]) -> String {
             maybe(row.certified_error_px),
             Cell::Number(row.cracks.to_string()),
             Cell::Number(row.errors.silhouette_px.to_string()),
+            Cell::Number(row.psnr_db.map_or_else(|| "∞".into(), |db| format!("{db:.1}"))),
         ];
         (class, cells)
     };
