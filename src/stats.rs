@@ -18,6 +18,8 @@ pub struct FrameStats {
     pub eye: [f64; 3],
     /// Moving the windows, reading what that exposes, and choosing patches.
     pub plan_ms: f64,
+    /// Finding what can be certified of it.
+    pub certify_ms: f64,
     /// Handing what is newly exposed to the device.
     pub upload_ms: f64,
     /// Drawing, to completion.
@@ -51,7 +53,7 @@ pub struct FrameStats {
     /// Patches whose detail vanished at once, because their data came too late to be taken back gently.
     pub pops: u64,
     /// Greatest error on the screen, in pixels ([`crate::accuracy`] says what is measured); null unless measured, as all
-    /// that follow.
+    /// up to `silhouette_px`.
     pub error_px_max: Option<f64>,
     /// Its 99th percentile over the pixels of terrain.
     pub error_px_p99: Option<f64>,
@@ -65,6 +67,14 @@ pub struct FrameStats {
     pub cracks: Option<u64>,
     /// Pixels at which the exact image and the drawn one disagree about being terrain.
     pub silhouette_px: Option<u64>,
+    /// An upper bound of the error anywhere in the frame, known before it was drawn; null where there is none.
+    pub certified_error_px: Option<f64>,
+    /// Why there is none; null where there is one.
+    pub certificate_reason: Option<String>,
+    /// The error that was promised; null where none was.
+    pub max_error_px: Option<f64>,
+    /// Whether what is certified keeps the promise; null where there was none.
+    pub keeps_max_error: Option<bool>,
 }
 
 /// Median and 99th percentile of one quantity over a run, by [`percentile`].
@@ -149,6 +159,10 @@ pub struct SummaryStats {
     pub input_checksum: Option<String>,
     /// Faults met on the way that did not end the run.
     pub faults: u64,
+    /// The greatest error that is certified of any frame; null where one has no certificate.
+    pub certified_error_px: Option<f64>,
+    /// Frames that keep the promised error; null where none was promised.
+    pub frames_keeping_max_error: Option<u64>,
     /// Of [`FrameStats::plan_ms`]; null without frames, as all that follow.
     pub plan_ms: Option<Spread>,
     /// Of [`FrameStats::upload_ms`].
@@ -195,6 +209,16 @@ impl SummaryStats {
             flight_checksum: run.flight_checksum,
             input_checksum: run.input_checksum,
             faults: run.faults,
+            certified_error_px: frames
+                .iter()
+                .map(|f| f.certified_error_px)
+                .try_fold(0.0, |most: f64, px| px.map(|px| most.max(px)))
+                .filter(|_| !frames.is_empty()),
+            frames_keeping_max_error: frames
+                .iter()
+                .map(|f| f.keeps_max_error.map(u64::from))
+                .sum::<Option<u64>>()
+                .filter(|_| !frames.is_empty()),
             plan_ms: spread(|f| f.plan_ms),
             upload_ms: spread(|f| f.upload_ms),
             draw_ms: spread(|f| f.draw_ms),
@@ -242,6 +266,7 @@ mod tests {
             t_s: frame as f64 / 30.0,
             eye: [1.0, 2.0, 3.0],
             plan_ms: frame as f64,
+            certify_ms: 0.125,
             upload_ms: 0.25,
             draw_ms: 5.0,
             gpu_ms: None,
@@ -265,6 +290,10 @@ mod tests {
             error_floor_px: None,
             cracks: None,
             silhouette_px: Some(2),
+            certified_error_px: Some(frame as f64 / 100.0),
+            certificate_reason: None,
+            max_error_px: Some(1.0),
+            keeps_max_error: Some(frame <= 100),
         }
     }
 
@@ -296,9 +325,10 @@ mod tests {
     fn a_frame_has_the_documented_names_in_order_and_comes_back() {
         let json = serde_json::to_string(&frame(3)).unwrap();
         let names: Vec<&str> = json.split('"').skip(1).step_by(2).collect();
-        let documented = "frame t_s eye plan_ms upload_ms draw_ms gpu_ms frame_ms triangles draw_calls patches \
-            patches_culled levels_drawn uploads upload_bytes upload_bytes_exposed complete cut stale_levels pops \
-            error_px_max error_px_p99 error_px_rms error_m_max error_floor_px cracks silhouette_px";
+        let documented = "frame t_s eye plan_ms certify_ms upload_ms draw_ms gpu_ms frame_ms triangles draw_calls \
+            patches patches_culled levels_drawn uploads upload_bytes upload_bytes_exposed complete cut stale_levels pops \
+            error_px_max error_px_p99 error_px_rms error_m_max error_floor_px cracks silhouette_px certified_error_px \
+            certificate_reason max_error_px keeps_max_error";
         assert_eq!(names, documented.split_whitespace().collect::<Vec<_>>());
         assert!(
             json.contains("\"gpu_ms\":null") && json.contains("\"cracks\":null"),
@@ -331,6 +361,16 @@ mod tests {
                 p99: 197_000.0
             })
         );
+        assert_eq!(
+            (summary.certified_error_px, summary.frames_keeping_max_error),
+            (Some(1.99), Some(101))
+        );
+        let mut uncertified = frames.clone();
+        uncertified[7].certified_error_px = None;
+        assert_eq!(
+            SummaryStats::new(Run::default(), &uncertified).certified_error_px,
+            None
+        );
         let json = serde_json::to_string(&summary).unwrap();
         assert!(json.starts_with("{\"summary\":true,"), "{json}");
         assert!(serde_json::from_str::<FrameStats>(&json).is_err());
@@ -351,5 +391,9 @@ mod tests {
         assert_eq!((summary.silhouette_px, summary.cracks), (Some(400), Some(0)));
         let empty = SummaryStats::new(Run::default(), &[]);
         assert_eq!((empty.frames, empty.frame_ms), (0, None));
+        assert_eq!(
+            (empty.certified_error_px, empty.frames_keeping_max_error),
+            (None, None)
+        );
     }
 }

@@ -3,7 +3,7 @@
 //! Rays over a grid of pixels find the drawn surface, as a frame would show it; the DEM's own surface is asked over the
 //! same places, and both are projected. Cameras: 30 % within 50 m of the ground, pitch from -90 to +10 degrees, all
 //! headings; clip sizes 64 to 256, transitions 1, 2, the default and the limit, the dial off and from 0.25 to 8 pixels.
-//! Nothing here is drawn; `tests/measured.rs` does the same with the depths of frames. 60 frames of each DEM by default;
+//! Nothing here is drawn; `tests/certified_frames.rs` does the same with the depths of frames. 60 frames of each DEM by default;
 //! the long form is
 //!
 //! ```sh

@@ -9,7 +9,8 @@
 //! `|g| / (W - g w') hypot((X/W w' - x') width / 2, (Y/W w' - y') height / 2)` pixels apart, a form in which nothing
 //! cancels. Where the bracket is not positive, Q is not before the camera, and no number of pixels is enough.
 //!
-//! *The floor* is what the rasteriser's grid and f32 can add at the pixel, given the slope of `S0` at Q. [`Facet`] bounds
+//! *The floor* is what the rasteriser's grid and f32 can add at the pixel, given the slope of `S0` at Q and within the grid's
+//! shift of it, whichever makes it greatest. [`Facet`] bounds
 //! by how much the depth of a triangle may be off: by r at one place, and by what its gradient makes of a shift of s
 //! pixels along each axis. Let the plane of the triangle of `S0` lie A below the eye, with normal n, and let e and s be
 //! what a step of a pixel to the east and to the south adds to the ray. A point at depth d on the ray is then
@@ -26,7 +27,7 @@ use super::exact::each_row;
 use super::{DepthImage, Facet, RASTER_PX};
 use crate::camera::View;
 use crate::error::Result;
-use crate::query::{Crossing, Probe, Triangle, Truth};
+use crate::query::{Crossing, Probe, Truth};
 use crate::work::Work;
 
 /// What was found at a pixel.
@@ -122,11 +123,25 @@ fn at_pixel(
             ..none
         });
     };
-    let scale = truth.vertical_scale();
+    let (grid, scale) = (truth.grid(), truth.vertical_scale());
     let up = (height_m - probe.eye().height_m) * scale;
     let gap_m = if scale == 0.0 { point.y } else { point.y - up };
-    let crossing = under.crossing(away_m, height_m);
-    let floor_m = floor_m(truth, view, &crossing, [pixel, [point.x, point.z]], up, depth);
+    let rounding = Rounding::new(truth, view, &under.crossing(away_m, height_m), pixel);
+    let across = [[1.0, 0.0], [0.0, 1.0]].map(|[dx, dy]| view.ray([pixel[0] + dx, pixel[1] + dy]) - ray);
+    let shift_m = (across[0].length() + across[1].length()) * rounding.place_px * away_m;
+    let mut floor_m = 0.0f64;
+    for [dx, dz] in AROUND.map(|d| d.map(|d| d * shift_m)) {
+        let Some(beside) = probe.under([point.x + dx, point.z + dz])? else {
+            continue;
+        };
+        let [east, south] = beside.slopes(grid.spacing_m).map(|s| s * scale);
+        // The triangle's plane over or under the eye, and its normal for an up component of 1.
+        let plane_up = up - (point.x * east + point.z * south);
+        let normal = DVec3::new(-east, 1.0, -south);
+        let shifted =
+            away_m * (normal.dot(across[0]).abs() + normal.dot(across[1]).abs()) * rounding.place_px;
+        floor_m = floor_m.max(plane_up.abs() * rounding.depth / depth + shifted); // leaves out voids
+    }
     let screen = Screen::new(view, pixel, away_m);
     let floor_px = screen.least_px(floor_m);
     Ok(PixelError {
@@ -142,43 +157,43 @@ fn to_f32(value: f64) -> f32 {
     value.min(f64::from(f32::MAX)) as f32
 }
 
-/// How far above or below the triangle of `S0` the rasteriser's grid and f32 may put what is drawn at a depth of a pixel, in
-/// metres as drawn. `places` are the pixel's centre and the point's metres east and south of the eye, `up` is the
-/// triangle's height there above the eye.
-fn floor_m(
-    truth: &Truth<'_>,
-    view: &View,
-    crossing: &Crossing,
-    places: [[f64; 2]; 2],
-    up: f64,
+/// The place itself and those around it, in shifts of the rasteriser's grid: what is drawn at a pixel may be the triangle
+/// of any of them.
+const AROUND: [[f64; 2]; 9] = [
+    [0.0, 0.0],
+    [-1.0, 0.0],
+    [1.0, 0.0],
+    [0.0, -1.0],
+    [0.0, 1.0],
+    [-1.0, -1.0],
+    [1.0, -1.0],
+    [-1.0, 1.0],
+    [1.0, 1.0],
+];
+
+/// By how much a device's depths may be off at one place, and places on the screen in pixels.
+#[derive(Clone, Copy)]
+struct Rounding {
     depth: f64,
-) -> f64 {
-    let (grid, scale) = (truth.grid(), truth.vertical_scale());
-    let [pixel, [x, z]] = places;
-    let quad = &crossing.quad;
-    let [rise_east, rise_south] = match crossing.triangle {
-        Triangle::SouthWest => [quad.se - quad.sw, quad.sw - quad.nw],
-        Triangle::NorthEast => [quad.ne - quad.nw, quad.se - quad.ne],
-    };
-    let [east, south] = [rise_east / grid.spacing_m[0], rise_south / grid.spacing_m[1]].map(|s| s * scale);
-    // The triangle's plane over or under the eye, and its normal for an up component of 1.
-    let plane_up = up - (x * east + z * south);
-    let normal = DVec3::new(-east, 1.0, -south);
-    let ray = view.ray(pixel);
-    let across = [[1.0, 0.0], [0.0, 1.0]].map(|[dx, dy]| {
-        let beside = view.ray([pixel[0] + dx, pixel[1] + dy]) - ray;
-        normal.dot(beside).abs()
-    });
-    let facet = Facet::new(grid, view, scale, crossing, pixel);
-    // Its plane goes through the eye: depths at one place do not matter.
-    let (depth_rounding, place_rounding_px) = facet.map_or((0.0, RASTER_PX), |f| {
-        (
-            depth * (f.vertex_rounding_m / crossing.along + 1.0 / (1u64 << 22) as f64),
-            f.place_rounding_px,
-        )
-    });
-    let near_m = crossing.along * depth;
-    (plane_up.abs() * depth_rounding + near_m * (across[0] + across[1]) * place_rounding_px) / depth
+    place_px: f64,
+}
+
+impl Rounding {
+    /// That of the triangle of `S0` that is crossed.
+    fn new(truth: &Truth<'_>, view: &View, crossing: &Crossing, pixel: [f64; 2]) -> Self {
+        let facet = Facet::new(truth.grid(), view, truth.vertical_scale(), crossing, pixel);
+        match facet {
+            // Its plane goes through the eye: depths at one place do not matter.
+            None => Self {
+                depth: 0.0,
+                place_px: RASTER_PX,
+            },
+            Some(f) => Self {
+                depth: f.depth_rounding,
+                place_px: f.place_rounding_px,
+            },
+        }
+    }
 }
 
 /// Vertical distances on the screen, from a point on the ray through a pixel.

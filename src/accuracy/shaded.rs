@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 
 use super::exact::each_row;
 use crate::camera::View;
-use crate::clipmap::{LIGHT_TEXEL_STEPS, LightTexel, height_range, light_texels};
+use crate::clipmap::{LIGHT_TEXEL_STEPS, LightTexel, height_range_m, light_texels};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
 use crate::levels::Levels;
@@ -68,7 +68,7 @@ impl Shading {
                 traced_light: look.traced_light && levels.has_light(),
                 ..*look
             },
-            range_m: height_range(levels)?,
+            range_m: height_range_m(levels)?,
             tiles: Shelf::new(BUDGET_BYTES),
         })
     }

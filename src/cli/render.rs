@@ -8,9 +8,10 @@ use super::Outcome;
 use super::args::{RenderArgs, ViewArgs};
 use super::input::beside;
 use super::progress::Terminal;
+use super::view_values::ClipSize;
 use crate::build::{Output, refuse_existing};
-use crate::camera::{Camera, Flight, check_picture, overview};
-use crate::clipmap::ClipmapOptions;
+use crate::camera::{Camera, Flight, View, check_picture, overview};
+use crate::clipmap::{ClipmapOptions, fit_clip_size, height_range_m};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu;
 use crate::grid::Grid;
@@ -56,14 +57,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         (None, false) if !args.force => refuse_existing(&out)?,
         (None, false) => {}
     }
-    let ring = ClipmapOptions {
-        clip_size: clip_size(args),
-        transition: args.view.transition,
-        wait: args.view.wait,
-        upload_budget_bytes: args.view.upload_budget,
-        ..Default::default()
-    };
-    ring.check()?;
+    let mut clipmap = clipmap_options(args)?;
     let stats = args
         .view
         .stats
@@ -74,38 +68,37 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
 
     let terrain = Terrain::open(&args.input, terminal)?;
     warn_of_sun(args, &terrain, terminal);
-    let mut headless = Headless::new(gpu, &terrain, &headless_options(&args.view, &terrain, &ring))?;
+    let scale = args.view.vertical_scale;
+    let heights = height_range_m(&terrain)?.map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
+    let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
+    let aspect = f64::from(args.view.size[0]) / f64::from(args.view.size[1]);
+    let shots = match (flight, args.flight.is_some(), args.eye) {
+        (Some(flight), ..) => Shots::Flight(flight),
+        (None, true, _) => Shots::Flight(Flight::orbit(terrain.grid(), low, high).scaled_down(scale)?),
+        (None, false, Some(eye)) => Shots::Still(camera(args, eye)),
+        (None, false, None) => Shots::Still(overview(terrain.grid(), low, high, aspect).scaled_down(scale)),
+    };
+    if args.view.clip_size == Some(ClipSize::Auto) {
+        clipmap.clip_size = fitting_clip_size(args, &shots, &terrain, &clipmap, terminal)?;
+    }
+    let mut headless = Headless::new(gpu, &terrain, &headless_options(&args.view, &terrain, &clipmap))?;
     if args.measure {
         headless.measure()?;
     }
-    let scale = args.view.vertical_scale;
-    let heights = headless
-        .clipmap()
-        .height_range_m()
-        .map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
-    let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
-    let aspect = f64::from(args.view.size[0]) / f64::from(args.view.size[1]);
-    let frames = match (flight, args.flight.is_some(), args.eye) {
-        (Some(flight), ..) => recording.record(&mut headless, &terrain, &flight, terminal)?,
-        (None, true, _) => {
-            let orbit = Flight::orbit(terrain.grid(), low, high).scaled_down(scale)?;
-            recording.record(&mut headless, &terrain, &orbit, terminal)?
-        }
-        (None, false, eye) => {
-            let camera = match eye {
-                Some(eye) => camera(args, eye),
-                None => overview(terrain.grid(), low, high, aspect).scaled_down(scale),
-            };
+    let frames = match &shots {
+        Shots::Flight(flight) => recording.record(&mut headless, &terrain, flight, terminal)?,
+        Shots::Still(camera) => {
             vec![picture(
                 &out,
                 args.force,
                 &mut headless,
                 &terrain,
-                &camera,
+                camera,
                 terminal,
             )?]
         }
     };
+    warn_of_promise(&frames, terminal);
     if frames.iter().all(|f| f.patches == 0) {
         terminal.warn(&format!("{}: no terrain is seen", terrain.name()));
     } else if frames.iter().any(|f| f.cut) {
@@ -138,6 +131,59 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     };
     terminal.note(&format!("{} holds {what}", out.display()));
     Ok(())
+}
+
+/// What is drawn.
+enum Shots {
+    Flight(Flight),
+    Still(Camera),
+}
+
+/// The smallest clip size that keeps the promised error in all frames.
+fn fitting_clip_size(
+    args: &RenderArgs,
+    shots: &Shots,
+    terrain: &Terrain,
+    clipmap: &ClipmapOptions,
+    terminal: &Terminal,
+) -> Result<i64> {
+    let cameras: Vec<Camera> = match shots {
+        Shots::Still(camera) => vec![*camera],
+        Shots::Flight(flight) => {
+            let frames = args.frames.clone().unwrap_or(0..flight.frame_count());
+            frames.map(|k| flight.camera_at_frame(k)).collect()
+        }
+    };
+    let views: Vec<View> = cameras
+        .into_iter()
+        .map(|camera| View::new(camera, args.view.size))
+        .collect::<Result<_>>()?;
+    let fit = fit_clip_size(terrain, &views, clipmap, terminal)?;
+    terminal.note(&format!("clip size {}", fit.clip_size));
+    Ok(fit.clip_size)
+}
+
+/// Says how far frames that do not keep the promised error are from it.
+fn warn_of_promise(frames: &[FrameStats], terminal: &Terminal) {
+    let broken: Vec<_> = frames
+        .iter()
+        .filter(|f| f.keeps_max_error == Some(false))
+        .collect();
+    let Some(first) = broken.first() else { return };
+    let promised = first.max_error_px.unwrap_or_default();
+    let worst = broken
+        .iter()
+        .try_fold(0.0, |most: f64, f| f.certified_error_px.map(|px| most.max(px)));
+    let certified = match worst {
+        Some(px) => format!("at most {px:.3} px is certified instead"),
+        None => "for some nothing can be certified".to_string(),
+    };
+    terminal.warn(&format!(
+        "{} of {} frames do not keep {promised} px, from frame {} on: {certified}; a greater --clip-size keeps more",
+        broken.len(),
+        frames.len(),
+        first.frame
+    ));
 }
 
 /// What faults say, each once: ground that is met again is damaged still.
@@ -223,7 +269,9 @@ fn camera(args: &RenderArgs, eye: [f64; 3]) -> Camera {
 fn clip_size(args: &RenderArgs) -> i64 {
     let whole = args.eye.is_none() && args.flight.as_deref().is_none_or(|f| f == Path::new("orbit"));
     match args.view.clip_size {
-        Some(asked) => asked,
+        Some(ClipSize::Fixed(asked)) => asked,
+        // Found once the terrain is known; until then a size whose transition may be as wide as any.
+        Some(ClipSize::Auto) => 2048,
         None if whole => {
             let wanted = 1.5 * f64::from(args.view.size[1]);
             (1i64 << (wanted.log2().round() as u32)).clamp(CLIP_SIZE, 2048)
@@ -232,7 +280,27 @@ fn clip_size(args: &RenderArgs) -> i64 {
     }
 }
 
-fn headless_options(view: &ViewArgs, terrain: &Terrain, ring: &ClipmapOptions) -> HeadlessOptions {
+fn clipmap_options(args: &RenderArgs) -> Result<ClipmapOptions> {
+    let view = &args.view;
+    if view.clip_size == Some(ClipSize::Auto) && view.max_error_px.is_none() {
+        let what = "auto keeps a promised error, and none is promised";
+        return Err(Error::new(ErrorKind::Misuse, "--clip-size", what).advice("give --max-error-px too"));
+    }
+    let options = ClipmapOptions {
+        clip_size: clip_size(args),
+        levels: view.levels,
+        transition: view.transition,
+        vertical_scale: view.vertical_scale,
+        cull: !view.no_cull,
+        max_error_px: view.max_error_px,
+        wait: view.wait,
+        upload_budget_bytes: view.upload_budget,
+    };
+    options.check()?;
+    Ok(options)
+}
+
+fn headless_options(view: &ViewArgs, terrain: &Terrain, clipmap: &ClipmapOptions) -> HeadlessOptions {
     // Traced light is that of its own sun; it moves only by preprocessing.
     let sun = terrain.sun().or(view.sun).unwrap_or_default();
     HeadlessOptions {
@@ -243,12 +311,7 @@ fn headless_options(view: &ViewArgs, terrain: &Terrain, ring: &ClipmapOptions) -
         haze: !view.no_haze,
         traced_light: terrain.has_light(),
         sun,
-        clipmap: ClipmapOptions {
-            levels: view.levels,
-            vertical_scale: view.vertical_scale,
-            cull: !view.no_cull,
-            ..*ring
-        },
+        clipmap: *clipmap,
     }
 }
 

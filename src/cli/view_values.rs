@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use super::values::{number, numbers};
 use crate::camera::MIN_FOV_DEG;
-use crate::clipmap::Wait;
+use crate::clipmap::{MAX_ERROR_PX, Wait};
 use crate::shade::ViewMode;
 
 /// A place `X,Y,Z` in world metres.
@@ -50,13 +50,37 @@ pub(super) fn frames(text: &str) -> Result<Range<u64>, String> {
     if from < to { Ok(from..to) } else { Err(wanted()) }
 }
 
-/// A clip size: a power of two from 64 to 2048.
-pub(super) fn clip_size(text: &str) -> Result<i64, String> {
+/// A clip size that was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ClipSize {
+    /// This one.
+    Fixed(i64),
+    /// The smallest that keeps the promised error.
+    Auto,
+}
+
+/// A clip size: a power of two from 64 to 2048, or auto.
+pub(super) fn clip_size(text: &str) -> Result<ClipSize, String> {
+    if text == "auto" {
+        return Ok(ClipSize::Auto);
+    }
     let size = text
         .parse::<i64>()
         .ok()
         .filter(|n| (64..=2048).contains(n) && n & (n - 1) == 0);
-    size.ok_or_else(|| "not a power of two from 64 to 2048".into())
+    size.map(ClipSize::Fixed)
+        .ok_or_else(|| "not a power of two from 64 to 2048, nor auto".into())
+}
+
+/// An error in pixels that can be promised.
+pub(super) fn max_error(text: &str) -> Result<f64, String> {
+    let px = number(text)?;
+    if MAX_ERROR_PX.contains(&px) {
+        Ok(px)
+    } else {
+        let (least, most) = (MAX_ERROR_PX.start(), MAX_ERROR_PX.end());
+        Err(format!("not within {least} to {most} pixels"))
+    }
 }
 
 /// Samples a pixel.
@@ -140,7 +164,8 @@ mod tests {
         for bad in ["", "3", "3..3", "5..2", "..4", "0..=3", "-1..3"] {
             assert!(frames(bad).is_err(), "{bad}");
         }
-        assert_eq!(clip_size("64"), Ok(64));
+        assert_eq!(clip_size("64"), Ok(ClipSize::Fixed(64)));
+        assert_eq!(clip_size("auto"), Ok(ClipSize::Auto));
         for bad in ["32", "100", "4096", "-64", "x"] {
             assert!(clip_size(bad).is_err(), "{bad}");
         }

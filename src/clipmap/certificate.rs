@@ -45,6 +45,13 @@ pub struct Certificate {
     pub patch: Option<Patch>,
 }
 
+impl Certificate {
+    /// Whether the frame is certified to err by at most `max_error_px` pixels.
+    pub fn keeps(&self, max_error_px: f64) -> bool {
+        self.error_px.is_ok_and(|px| px <= max_error_px)
+    }
+}
+
 /// Why a frame has no certificate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Uncertified {

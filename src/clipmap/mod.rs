@@ -11,6 +11,7 @@ mod constants;
 mod drawn;
 mod extent;
 mod eye;
+mod fit;
 mod frustum;
 mod ground;
 mod held;
@@ -35,6 +36,7 @@ pub use constants::{
 };
 pub use drawn::{CORNERS, Corners, Drawn, Place};
 pub use eye::Eye;
+pub use fit::{ClipSizeFit, fit_clip_size};
 pub use frustum::Frustum;
 pub use held::{FADE_S, HeldField};
 pub use options::{ClipmapOptions, MAX_ERROR_PX, MAX_VERTICAL_SCALE};
@@ -126,7 +128,11 @@ impl Clipmap {
             .map_err(|what| Error::new(ErrorKind::Misuse, "terrain", what))?;
         options.check()?;
         let ring = options.ring()?;
-        let fitting = grid.levels_until(ring.clip_size).min(levels.level_count());
+        // Beyond the first level that fits into one window the rings have nothing to add, the dial has.
+        let fitting = match options.max_error_px {
+            None => grid.levels_until(ring.clip_size).min(levels.level_count()),
+            Some(_) => levels.level_count(),
+        };
         let count = options.levels.map_or(fitting, |l| l.min(fitting));
         Ok(Self {
             identity: Identity::new(),
@@ -137,7 +143,7 @@ impl Clipmap {
             max_error_px: options.max_error_px,
             cut: count < fitting,
             has_light: levels.has_light(),
-            range_m: height_range(levels)?,
+            range_m: height_range_m(levels)?,
             windows: (0..count).map(|l| Window::new(l, &grid, &ring)).collect(),
             held: HeldField::new(count, ring.held_size()),
             wait: options.wait,
@@ -406,8 +412,12 @@ fn no_frame(what: &str) -> Error {
     Error::new(ErrorKind::Misuse, "clipmap", format!("there is no frame {what}")).advice("update it first")
 }
 
-/// The least and greatest height of a DEM, from the saturated bounds of its coarsest level, which are small.
-pub(crate) fn height_range(levels: &dyn Levels) -> Result<[f32; 2]> {
+/// The least and greatest height of a DEM in metres above its base, from the saturated bounds of its coarsest level, which
+/// are few; 0 where it has none.
+///
+/// # Errors
+/// Those of `levels`; [`ErrorKind::Unsupported`] where those bounds are not there.
+pub fn height_range_m(levels: &dyn Levels) -> Result<[f32; 2]> {
     let coarsest = levels.level_count() - 1;
     let patches = levels.grid().patches(coarsest).rect();
     let mut bounds = vec![Bounds::VOID; patches.area() as usize];

@@ -17,7 +17,8 @@ pub const MAX_ERROR_PX: RangeInclusive<f64> = 1e-6..=1e6;
 pub struct ClipmapOptions {
     /// Clip size N, samples along a window's side: a power of two, 64 to 2048.
     pub clip_size: i64,
-    /// Keep only this many levels, the finest; all that the DEM has where none.
+    /// Keep only this many levels, the finest. Where none, all up to the first that fits into one window, and with a
+    /// promised error all that the DEM has.
     pub levels: Option<u32>,
     /// Width of the transition band in steps, 0 to `N/4 - 10`; `N/10` rounded down where none.
     pub transition: Option<i64>,

@@ -359,6 +359,16 @@ impl<'a> Walk<'a> {
 }
 
 impl Under {
+    /// Rise over run to the east and to the south of the triangle that holds the place, NaN where a corner of it is void.
+    pub fn slopes(&self, spacing_m: [f64; 2]) -> [f64; 2] {
+        let quad = &self.quad;
+        let [east, south] = match Triangle::holding(self.at) {
+            Triangle::SouthWest => [quad.se - quad.sw, quad.sw - quad.nw],
+            Triangle::NorthEast => [quad.ne - quad.nw, quad.se - quad.ne],
+        };
+        [east / spacing_m[0], south / spacing_m[1]]
+    }
+
     /// The surface's height there, metres above the DEM's base; none in a hole.
     pub fn height_m(&self) -> Option<f64> {
         self.quad.height(self.at)

@@ -6,7 +6,7 @@ use super::error_view::colour_errors;
 use super::measuring::{Measured, MeasuringPass};
 use crate::accuracy::ErrorPool;
 use crate::camera::{View, check_picture};
-use crate::clipmap::{Clipmap, ClipmapOptions, UpdateReport};
+use crate::clipmap::{Certificate, Clipmap, ClipmapOptions, UpdateReport, certify};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu::{
     ClipmapRenderer, DrawReport, Gpu, RendererOptions, SkyRenderer, UploadReport, ViewTextures, read,
@@ -46,12 +46,16 @@ pub struct Frame {
     pub rgba8: Vec<u8>,
     /// What the update did.
     pub update: UpdateReport,
+    /// What is certified of its error.
+    pub certificate: Certificate,
     /// What was uploaded.
     pub upload: UploadReport,
     /// What was drawn.
     pub draw: DrawReport,
     /// Moving the windows (what is newly exposed is read) and selecting patches, in wall milliseconds.
     pub plan_ms: f64,
+    /// Finding the certificate.
+    pub certify_ms: f64,
     /// Writing the uploads into mapped memory and recording their copies, which are part of the draw.
     pub upload_ms: f64,
     /// Recording, submitting and waiting for the draw, without reading back.
@@ -157,6 +161,8 @@ impl Headless {
         }
         let update = *self.clipmap.update(levels, view, time_s)?;
         let planned = Instant::now();
+        let certificate = certify(&self.clipmap)?;
+        let certified = Instant::now();
         let mut encoder = self
             .gpu
             .device
@@ -179,10 +185,12 @@ impl Headless {
         Ok(Frame {
             rgba8,
             update,
+            certificate,
             upload,
             draw,
             plan_ms: ms(start, planned),
-            upload_ms: ms(planned, uploaded),
+            certify_ms: ms(planned, certified),
+            upload_ms: ms(certified, uploaded),
             draw_ms: ms(uploaded, drawn),
             gpu_ms,
             frame_ms,

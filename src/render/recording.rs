@@ -86,7 +86,13 @@ impl Recording {
             if let Some(animation) = &mut animation {
                 animation.add(&frame.rgba8)?;
             }
-            stats.push(frame_stats(&frame, k, flight.time_of_frame_s(k), &camera));
+            stats.push(frame_stats(
+                &frame,
+                headless,
+                k,
+                flight.time_of_frame_s(k),
+                &camera,
+            ));
             progress.advance(1);
         }
         if let (Some(sheet), Some(path)) = (&sheet, &self.contact_sheet) {
@@ -153,7 +159,7 @@ pub fn picture(
     }
     let [width, height] = headless.size_px();
     write_png(path, width, height, &frame.rgba8)?;
-    Ok(frame_stats(&frame, 0, 0.0, camera))
+    Ok(frame_stats(&frame, headless, 0, 0.0, camera))
 }
 
 fn folder_error(folder: &Path, error: std::io::Error) -> Error {
@@ -164,13 +170,15 @@ fn folder_error(folder: &Path, error: std::io::Error) -> Error {
     Error::io(folder.display(), error)
 }
 
-fn frame_stats(frame: &Frame, k: u64, t_s: f64, camera: &Camera) -> FrameStats {
+fn frame_stats(frame: &Frame, headless: &Headless, k: u64, t_s: f64, camera: &Camera) -> FrameStats {
+    let max_error_px = headless.clipmap().max_error_px();
     let errors = frame.measured.as_ref().map(|m| m.errors.summary);
     FrameStats {
         frame: k,
         t_s,
         eye: camera.eye.to_array(),
         plan_ms: frame.plan_ms,
+        certify_ms: frame.certify_ms,
         upload_ms: frame.upload_ms,
         draw_ms: frame.draw_ms,
         gpu_ms: frame.gpu_ms,
@@ -194,5 +202,9 @@ fn frame_stats(frame: &Frame, k: u64, t_s: f64, camera: &Camera) -> FrameStats {
         error_floor_px: errors.map(|e| e.error_floor_px),
         cracks: frame.measured.as_ref().map(|m| m.cracks),
         silhouette_px: errors.map(|e| e.silhouette_px),
+        certified_error_px: frame.certificate.error_px.ok(),
+        certificate_reason: frame.certificate.error_px.err().map(|u| u.reason().to_string()),
+        max_error_px,
+        keeps_max_error: max_error_px.map(|px| frame.certificate.keeps(px)),
     }
 }

@@ -8,6 +8,8 @@ use clipscape::grid::{Grid, Patch, Rect};
 use clipscape::levels::{Arrival, Bounds, Levels, LightSample};
 use half::f16;
 
+#[cfg(feature = "gpu")]
+pub mod depths;
 pub mod facts;
 pub mod motion;
 pub mod scenes;

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::{values, view_values};
+use crate::cli::values;
+use crate::cli::view_values::{self, ClipSize};
 use crate::clipmap::Wait;
 use crate::light::Sun;
 use crate::shade::ViewMode;
@@ -85,10 +86,10 @@ pub(in crate::cli) struct ViewArgs {
     #[arg(long, value_name = "WxH", value_parser = view_values::size, default_value = "1280x720", allow_hyphen_values = true)]
     pub(in crate::cli) size: [u32; 2],
 
-    /// Samples along the side of a level's window, a power of two from 64 to 2048 [default: 256; what
-    /// suits the picture's height where the whole DEM is shown]
-    #[arg(long, value_name = "N", value_parser = view_values::clip_size, allow_negative_numbers = true)]
-    pub(in crate::cli) clip_size: Option<i64>,
+    /// Samples along the side of a level's window, a power of two from 64 to 2048, or auto for the smallest that keeps
+    /// --max-error-px [default: 256; what suits the picture's height where the whole DEM is shown]
+    #[arg(long, value_name = "N|auto", value_parser = view_values::clip_size, allow_negative_numbers = true)]
+    pub(in crate::cli) clip_size: Option<ClipSize>,
 
     /// Keep only the finest levels, this many
     #[arg(long, value_name = "L", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
@@ -97,6 +98,11 @@ pub(in crate::cli) struct ViewArgs {
     /// Width of the morph band in steps of a level, 0 to N/4 - 10 [default: N/10]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(i64).range(0..), allow_negative_numbers = true)]
     pub(in crate::cli) transition: Option<i64>,
+
+    /// Promise that nothing is drawn more than this many pixels from where the DEM has it, and leave out detail that the
+    /// promise does not need; --stats says what each frame certifies
+    #[arg(long, value_name = "E", value_parser = view_values::max_error, allow_negative_numbers = true)]
+    pub(in crate::cli) max_error_px: Option<f64>,
 
     /// Whether frames wait for all of their data, or are drawn with what is there [default: all]
     #[arg(long, value_name = "all|none", value_parser = view_values::wait, default_value = "all", hide_default_value = true)]
@@ -168,6 +174,11 @@ mod tests {
             (args.view.size, args.view.clip_size, args.view.msaa),
             ([1, 1], None, 1)
         );
+        let args = parse("render a.exr --clip-size auto --max-error-px 0.5").unwrap();
+        assert_eq!(
+            (args.view.clip_size, args.view.max_error_px),
+            (Some(ClipSize::Auto), Some(0.5))
+        );
         let args = parse("render a.exr --flight orbit --frames 0..3 --view level").unwrap();
         assert_eq!((args.frames, args.view.view), (Some(0..3), ViewMode::Level));
         assert!(!args.measure && parse("render a.exr --measure --stats b").unwrap().measure);
@@ -179,6 +190,9 @@ mod tests {
             "render a.tif --msaa 2",
             "render a.tif --levels 0",
             "render a.tif --eye 0,nan,0",
+            "render a.tif --clip-size 100",
+            "render a.tif --max-error-px 0",
+            "render a.tif --max-error-px -1",
         ] {
             assert!(parse(bad).is_err(), "{bad}");
         }

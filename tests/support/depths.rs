@@ -1,0 +1,80 @@
+//! The depth image of one clipmap after another, by one set of pipelines.
+
+use clipscape::Clipmap;
+use clipscape::gpu::{ClipmapRenderer, Gpu, RendererOptions};
+use clipscape::light::Sun;
+use clipscape::shade::ViewMode;
+
+/// Draws one clipmap after another into one picture's depth.
+pub struct Depths {
+    pub gpu: Gpu,
+    renderer: ClipmapRenderer,
+    colour: wgpu::Texture,
+    depth: wgpu::Texture,
+}
+
+impl Depths {
+    pub fn new(gpu: Gpu, size_px: [u32; 2]) -> Self {
+        let options = RendererOptions {
+            view_mode: ViewMode::Level,
+            traced_light: false,
+            ..Default::default()
+        };
+        let texture = |format| {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("clipscape test target"),
+                size: wgpu::Extent3d {
+                    width: size_px[0],
+                    height: size_px[1],
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            })
+        };
+        Self {
+            renderer: ClipmapRenderer::new(&gpu.device, &options).unwrap(),
+            colour: texture(options.colour_format),
+            depth: texture(options.depth_format),
+            gpu,
+        }
+    }
+
+    pub fn draw(&self, clipmap: &Clipmap) -> Vec<f32> {
+        let device = &self.gpu.device;
+        let mut textures = self.renderer.textures(device, clipmap, Sun::default()).unwrap();
+        let mut encoder = device.create_command_encoder(&Default::default());
+        self.renderer
+            .upload(&mut encoder, clipmap, &mut textures)
+            .unwrap();
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("clipscape test pass"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.colour.create_view(&Default::default()),
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth.create_view(&Default::default()),
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        self.renderer.draw(&mut pass, clipmap, &textures).unwrap();
+        drop(pass);
+        self.gpu.queue.submit([encoder.finish()]);
+        bytemuck::pod_collect_to_vec(&self.gpu.read_texture(&self.depth, 0).unwrap())
+    }
+}
