@@ -57,10 +57,14 @@ fn pictures(gpu: &clipscape::gpu::Gpu, scene: &Scene<'_>, camera: Camera, exact:
     let threads = Threads::new(0).unwrap();
     let view = View::new(camera, SIZE_PX).unwrap();
     let truth = Truth::new(scene.levels, scene.vertical_scale);
-    // The surface is the truth's.
+    // The surface is the truth's, but for pixels beside triangles that are seen edge on.
     let depths = headless.read_depth().unwrap();
     let errors = measure(&truth, &DepthImage::new(&depths, &view).unwrap(), &threads).unwrap();
-    assert!(errors.summary.error_px_max < 1.0 / 32.0, "{:?}", errors.summary);
+    assert!(
+        errors.summary.error_px_max < 0.25 && errors.summary.error_px_p99 == 0.0,
+        "{:?}",
+        errors.summary
+    );
     let shading = Shading::new(scene.levels, exact).unwrap();
     [drawn, shading.picture(&truth, &view, &threads).unwrap()]
 }

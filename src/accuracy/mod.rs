@@ -8,6 +8,7 @@
 mod cracks;
 mod exact;
 mod facet;
+mod foreign;
 mod measured;
 mod pool;
 mod shaded;
@@ -15,6 +16,7 @@ mod shaded;
 pub use cracks::cracks;
 pub use exact::ExactImage;
 pub use facet::{Facet, INTERPOLATION, RASTER_PX, ROUNDING};
+pub use foreign::{Distances, parse_camera};
 pub use measured::{ErrorSummary, FrameErrors, PixelError, measure};
 pub use pool::{ErrorPool, RESOLUTION};
 pub use shaded::{Look, Shading, psnr_db};

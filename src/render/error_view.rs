@@ -3,21 +3,21 @@
 //! | error | colour |
 //! |---|---|
 //! | 0 px, or nothing beyond the floor | none: the grey of the light |
-//! | above 0 px | blue |
+//! | 0.1 px | blue |
 //! | 0.25 px | cyan |
 //! | 0.5 px | green |
 //! | 1 px | yellow |
 //! | 2 px and more | red |
 //! | drawn and true ground disagree about being there | magenta |
 //!
-//! Between these colours run into each other. All but the last are darkened by the light, so that the ground stays
+//! Between these, colours run into each other. All but the last are darkened by the light, so that the ground stays
 //! readable; the last is not, as it may lie in the sky.
 
 use crate::accuracy::{FrameErrors, PixelError};
 
 /// Colours by error in pixels: sRGB, 0 to 1.
 const SCALE: [(f32, [f32; 3]); 5] = [
-    (0.0, [0.20, 0.30, 1.00]),
+    (0.1, [0.20, 0.30, 1.00]),
     (0.25, [0.10, 0.85, 1.00]),
     (0.5, [0.20, 0.90, 0.25]),
     (1.0, [1.00, 0.90, 0.15]),
@@ -47,8 +47,13 @@ fn colour(pixel: &PixelError, light: u8) -> Option<[u8; 3]> {
     if pixel.error_px.is_nan() || pixel.error_px == 0.0 {
         return None;
     }
-    let share = DARKEST + (1.0 - DARKEST) * f32::from(light) / 255.0;
-    Some(scale(pixel.error_px).map(|c| (c * share * 255.0).round() as u8))
+    let grey = f32::from(light) / 255.0;
+    let share = DARKEST + (1.0 - DARKEST) * grey;
+    let coloured = (pixel.error_px / SCALE[0].0).min(1.0);
+    Some(scale(pixel.error_px).map(|c| {
+        let mixed = grey + (c * share - grey) * coloured;
+        (mixed * 255.0).round() as u8
+    }))
 }
 
 fn scale(error_px: f32) -> [f32; 3] {
@@ -79,6 +84,9 @@ mod tests {
     fn colours_are_those_of_the_table() {
         let bright = |error_px| colour(&pixel(error_px), 255);
         assert_eq!((bright(0.0), bright(f32::NAN)), (None, None));
+        let near_grey = colour(&pixel(1e-3), 128).unwrap();
+        assert!(near_grey.iter().all(|c| c.abs_diff(128) <= 2), "{near_grey:?}");
+        assert_eq!(bright(0.1), Some([51, 77, 255]));
         assert_eq!(bright(0.25), Some([26, 217, 255]));
         assert_eq!(bright(1.0), Some([255, 230, 38]));
         assert_eq!(bright(2.0), bright(f32::MAX));

@@ -19,6 +19,7 @@ mod write;
 
 pub use georeference::{Georeference, Registration};
 pub use open::{open, open_bytes, open_file};
+pub(crate) use openexr::{Wanted, read_channel};
 pub use read_at::{Cursor, ReadAt};
 pub use synth::{MAX_SYNTH_SIZE, Synth};
 #[cfg(feature = "dem")]

@@ -14,14 +14,51 @@ use exr::meta::header::Header;
 use half::f16;
 
 use super::held::{Held, Scale, Values, bare_description, check_claim, size};
-use super::{Cursor, ReadAt};
+use super::{Cursor, HeightSource, ReadAt};
 use crate::error::{Error, ErrorKind, Result};
-use crate::grid::Grid;
+use crate::grid::{Grid, Size};
 
-const NAMES: [&str; 5] = ["Y", "Z", "height", "H", "R"];
-
-/// Reads the picture `name`.
+/// Reads the heights of the picture `name`.
 pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
+    open_channel(name, bytes, &Wanted::HEIGHTS)
+}
+
+/// What is looked for in a picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wanted {
+    /// Names of its channel, the best first.
+    pub(crate) names: &'static [&'static str],
+    /// Whether a picture's only channel will do, whatever its name.
+    pub(crate) only: bool,
+    /// What it holds, in the plural.
+    pub(crate) what: &'static str,
+    /// What else could be given.
+    pub(crate) advice: &'static str,
+}
+
+impl Wanted {
+    const HEIGHTS: Self = Self {
+        names: &["Y", "Z", "height", "H", "R"],
+        only: true,
+        what: "heights",
+        advice: "give one channel, or one named Y, Z, height, H or R",
+    };
+}
+
+/// Reads a channel of the picture `name`: its size and its values, row by row, NaN where they are not finite.
+///
+/// # Errors
+/// Where the file is damaged, or has no such channel.
+pub(crate) fn read_channel(name: &str, bytes: Arc<dyn ReadAt>, wanted: &Wanted) -> Result<(Size, Vec<f64>)> {
+    let held = open_channel(name, bytes, wanted)?;
+    let Grid { size, base_m, .. } = held.description().grid;
+    let mut values = vec![0.0; size.samples() as usize];
+    held.read(size.rect(), &mut values)?;
+    Ok((size, values.into_iter().map(|v| f64::from(v) + base_m).collect()))
+}
+
+/// As if it were of heights.
+fn open_channel(name: &str, bytes: Arc<dyn ReadAt>, wanted: &Wanted) -> Result<Held> {
     let file_bytes = bytes.size_bytes();
     let failed = |error: exr::error::Error| refused(name, error);
     let reader = exr::block::read(BufReader::new(Cursor::new(bytes)), false).map_err(failed)?;
@@ -33,16 +70,15 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
         check_claim(name, width, height, pixel_bytes.max(1), file_bytes)?;
         check_claim(name, header.chunk_count as u64, 1, 1, file_bytes)?;
     }
-    let (layer, channel) = choose(headers).ok_or_else(|| {
+    let (layer, channel) = choose(headers, wanted).ok_or_else(|| {
         let names: Vec<String> = headers
             .iter()
             .flat_map(|h| &h.channels.list)
             .take(8)
             .map(|c| c.name.to_string())
             .collect();
-        let what = format!("has no channel of heights among {}", names.join(", "));
-        Error::new(ErrorKind::Unsupported, name, what)
-            .advice("give one channel, or one named Y, Z, height, H or R")
+        let what = format!("has no channel of {} among {}", wanted.what, names.join(", "));
+        Error::new(ErrorKind::Unsupported, name, what).advice(wanted.advice)
     })?;
     let header = &headers[layer];
     let description = &header.channels.list[channel];
@@ -72,9 +108,10 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
             .as_ref()
             .map(|n| format!(" of part {n}"));
         assumed.push(format!(
-            "Of several channels, {}{} is taken as heights.",
+            "Of several channels, {}{} is taken as {}.",
             description.name,
-            part.unwrap_or_default()
+            part.unwrap_or_default(),
+            wanted.what
         ));
     }
 
@@ -147,8 +184,8 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
     Held::new(description, heights.heights)
 }
 
-/// Part and channel that hold the heights.
-fn choose(headers: &[Header]) -> Option<(usize, usize)> {
+/// Part and channel that hold what is wanted.
+fn choose(headers: &[Header], wanted: &Wanted) -> Option<(usize, usize)> {
     let find = |name: &str| {
         headers.iter().enumerate().find_map(|(layer, header)| {
             let channel = header.channels.list.iter().position(|c| c.name.eq(name))?;
@@ -157,9 +194,9 @@ fn choose(headers: &[Header]) -> Option<(usize, usize)> {
     };
     let only = || {
         let [header] = headers else { return None };
-        (header.channels.list.len() == 1).then_some((0, 0))
+        (wanted.only && header.channels.list.len() == 1).then_some((0, 0))
     };
-    NAMES.into_iter().find_map(find).or_else(only)
+    wanted.names.iter().copied().find_map(find).or_else(only)
 }
 
 fn set<const N: usize>(
@@ -203,7 +240,6 @@ fn refused(name: &str, error: exr::error::Error) -> Error {
 
 #[cfg(test)]
 mod tests {
-    use super::super::HeightSource;
     use super::*;
     use crate::error::Result;
     use exr::prelude::*;

@@ -123,7 +123,7 @@ pub(in crate::cli) struct ViewArgs {
     pub(in crate::cli) sun: Option<Sun>,
 
     /// What is shown: shaded, light (the bare light), level (levels, their bands, what is held back), wire (triangles), or
-    /// error (how far each pixel is off the DEM's own surface: grey 0, blue above 0, cyan 0.25, green 0.5, yellow 1, red
+    /// error (how far each pixel is off the DEM's own surface: grey 0, blue 0.1, cyan 0.25, green 0.5, yellow 1, red
     /// 2 pixels and more; magenta where the two disagree about being terrain)
     #[arg(long, value_name = "VIEW", value_parser = view_values::view, default_value = "shaded")]
     pub(in crate::cli) view: ViewMode,
