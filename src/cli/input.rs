@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use crate::error::Result;
-use crate::source::{self, HeightSource, Synth};
+use crate::source::{self, HeightSource, OpenOptions, Synth};
 use crate::terrain::{self, SourceStamp, TerrainFile};
 
 /// An opened INPUT.
@@ -25,7 +25,11 @@ pub(super) fn open(path: &Path) -> Result<Input> {
     if terrain::is_terrain(bytes.as_ref()) {
         return Ok(Input::Terrain(Box::new(TerrainFile::open(&name, bytes)?)));
     }
-    Ok(Input::Dem(source::open_bytes(&name, bytes)?))
+    Ok(Input::Dem(source::open_bytes(
+        &name,
+        bytes,
+        &OpenOptions::default(),
+    )?))
 }
 
 fn synth(path: &Path) -> Option<Result<Synth>> {

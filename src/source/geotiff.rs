@@ -19,7 +19,7 @@ use tiff::tags::Tag;
 
 use self::nodata::Nodata;
 use super::held::{HEIGHTS_ASSUMED, Held, Scale, Values, check_claim, size};
-use super::{Cursor, Description, ReadAt};
+use super::{Cursor, Description, OpenOptions, ReadAt};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Grid;
 
@@ -43,12 +43,13 @@ const OVERVIEW: u32 = 1;
 type Tiff = Decoder<BufReader<Cursor>>;
 
 /// Reads the image `name`.
-pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
+pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>, options: &OpenOptions) -> Result<Held> {
     let file_bytes = bytes.size_bytes();
     let failed = |error: TiffError| refused(name, error);
     let mut tiff = Decoder::new(BufReader::new(Cursor::new(bytes))).map_err(failed)?;
     let (width, height) = tiff.dimensions().map_err(failed)?;
     check_kind(name, &mut tiff)?;
+    options.band_index(name, 1)?;
     let layout = tiff.image_chunk_buffer_layout(0).map_err(failed)?;
     let sample = layout.sample_type.map(Sample::of);
     let Some(sample) = sample else {
@@ -82,7 +83,10 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
 
     let size = size(u64::from(width), u64::from(height));
     let mut assumed = Vec::new();
-    let nodata = nodata_of(name, &mut tiff, sample, &mut assumed)?;
+    let nodata = match options.nodata {
+        Some(value) => Nodata::parse(&format!("{value:?}"), sample.integer),
+        None => nodata_of(name, &mut tiff, sample, &mut assumed)?,
+    };
     let values = decode(name, &mut tiff, [width, height], nodata, sample, count)?;
     let located = place::locate(name, &mut tiff, size)?;
     let items = metadata::read(&text_tag(&mut tiff, Tag::Unknown(42112)).unwrap_or_default());

@@ -10,6 +10,7 @@ mod held;
 mod hgt;
 mod open;
 mod openexr;
+mod options;
 #[cfg(feature = "dem")]
 mod png;
 mod read_at;
@@ -19,6 +20,7 @@ mod write;
 
 pub use georeference::{Georeference, Registration};
 pub use open::{open, open_bytes, open_file};
+pub use options::{Band, Crop, OpenOptions, RawLayout, SampleType};
 pub use read_at::{Cursor, ReadAt};
 pub use synth::{MAX_SYNTH_SIZE, Synth};
 #[cfg(feature = "dem")]

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::file::OpenFile;
-use super::{HeightSource, ReadAt, ascii_grid, hgt, openexr};
+use super::{HeightSource, OpenOptions, ReadAt, ascii_grid, hgt, openexr};
 use crate::error::{Error, ErrorKind, Result};
 
 /// The formats by what messages call them, and the endings that promise them.
@@ -28,7 +28,11 @@ const READ_HERE: &str = "give a GeoTIFF, a grey PNG, OpenEXR, SRTM .hgt or ESRI 
 /// # Errors
 /// One clear line where the file is missing, no plain file, empty, damaged, or of a kind that is not read.
 pub fn open(path: &Path) -> Result<Box<dyn HeightSource>> {
-    open_bytes(&path.display().to_string(), open_file(path)?)
+    open_bytes(
+        &path.display().to_string(),
+        open_file(path)?,
+        &OpenOptions::default(),
+    )
 }
 
 /// The bytes of the file at `path`, read where they are asked for.
@@ -55,7 +59,11 @@ pub fn open_file(path: &Path) -> Result<Arc<dyn ReadAt>> {
 ///
 /// # Errors
 /// As [`open`].
-pub fn open_bytes(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSource>> {
+pub fn open_bytes(
+    name: &str,
+    bytes: Arc<dyn ReadAt>,
+    options: &OpenOptions,
+) -> Result<Box<dyn HeightSource>> {
     if bytes.size_bytes() == 0 {
         return Err(Error::new(ErrorKind::Broken, name, "is empty").advice("fetch the file again"));
     }
@@ -64,7 +72,7 @@ pub fn open_bytes(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSo
         .read_exact_at(0, &mut head)
         .map_err(|error| Error::io(name, error))?;
     Ok(match format(name, &head)? {
-        Format::GeoTiff => geotiff(name, bytes)?,
+        Format::GeoTiff => geotiff(name, bytes, options)?,
         Format::Png => png(name, bytes)?,
         Format::OpenExr => Box::new(openexr::open(name, bytes)?),
         Format::Srtm => Box::new(hgt::open(name, bytes.as_ref())?),
@@ -73,8 +81,8 @@ pub fn open_bytes(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSo
 }
 
 #[cfg(feature = "dem")]
-fn geotiff(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSource>> {
-    Ok(Box::new(super::geotiff::open(name, bytes)?))
+fn geotiff(name: &str, bytes: Arc<dyn ReadAt>, options: &OpenOptions) -> Result<Box<dyn HeightSource>> {
+    Ok(Box::new(super::geotiff::open(name, bytes, options)?))
 }
 
 #[cfg(feature = "dem")]
@@ -83,7 +91,7 @@ fn png(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSource>> {
 }
 
 #[cfg(not(feature = "dem"))]
-fn geotiff(name: &str, _: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSource>> {
+fn geotiff(name: &str, _: Arc<dyn ReadAt>, _: &OpenOptions) -> Result<Box<dyn HeightSource>> {
     Err(left_out(name, "GeoTIFF"))
 }
 
@@ -147,7 +155,7 @@ mod tests {
     use super::*;
 
     fn failure(name: &str, bytes: &[u8]) -> Error {
-        match open_bytes(name, Arc::new(bytes.to_vec())) {
+        match open_bytes(name, Arc::new(bytes.to_vec()), &OpenOptions::default()) {
             Ok(_) => panic!("{name} was opened"),
             Err(error) => error,
         }

@@ -187,7 +187,7 @@ fn failed(error: TiffError) -> Error {
 #[cfg(test)]
 mod tests {
     use super::super::held::{Held, bare_description};
-    use super::super::{Georeference, Synth, open_bytes};
+    use super::super::{Georeference, OpenOptions, Synth, open_bytes};
     use super::*;
     use crate::grid::Size;
     use crate::progress::Silent;
@@ -197,7 +197,7 @@ mod tests {
     fn round_trip(source: &dyn HeightSource) -> (Description, Vec<f32>) {
         let mut out = Cursor::new(Vec::new());
         write_tiff(&mut out, source, &Silent).unwrap();
-        let back = open_bytes("back.tif", Arc::new(out.into_inner())).unwrap();
+        let back = open_bytes("back.tif", Arc::new(out.into_inner()), &OpenOptions::default()).unwrap();
         (back.description().clone(), all(back.as_ref()))
     }
 

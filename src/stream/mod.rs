@@ -13,7 +13,7 @@ use crate::levels::{Arrival, Bounds, Levels, LightSample};
 use crate::light::Sun;
 use crate::progress::Progress;
 use crate::pyramid::DEFAULT_LOBES;
-use crate::source::{self, Description, HeightSource, ReadAt, Synth};
+use crate::source::{self, Description, HeightSource, OpenOptions, ReadAt, Synth};
 use crate::terrain::{Meta, TerrainFile, is_terrain};
 
 /// A terrain, shared by any number of views.
@@ -70,7 +70,10 @@ impl Terrain {
                 origin,
             });
         }
-        Self::from_source(source::open_bytes(name, bytes)?.as_ref(), progress)
+        Self::from_source(
+            source::open_bytes(name, bytes, &OpenOptions::default())?.as_ref(),
+            progress,
+        )
     }
 
     /// The terrain of a DEM that the caller reads: its pyramid is built in memory.

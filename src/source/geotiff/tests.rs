@@ -83,7 +83,7 @@ where
 }
 
 fn read(bytes: Vec<u8>) -> Result<(Description, Vec<f32>)> {
-    let held = open("t.tif", Arc::new(bytes))?;
+    let held = open("t.tif", Arc::new(bytes), &OpenOptions::default())?;
     let size = held.description().grid.size;
     let mut out = vec![0.0; size.samples() as usize];
     held.read(size.rect(), &mut out)?;
