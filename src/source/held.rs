@@ -6,7 +6,7 @@ use crate::grid::{Grid, MAX_SIZE, Rect, Size};
 
 /// No lossless coder in use packs more than this many bytes of samples into one byte of a file (deflate,
 /// the densest, ends at 1032).
-const MAX_COMPRESSION: u64 = 1040;
+pub(super) const MAX_COMPRESSION: u64 = 1040;
 
 /// A DEM whose heights are all in memory.
 #[derive(Debug)]
@@ -173,13 +173,6 @@ impl Values {
         Ok(())
     }
 
-    /// Turns the order of rows about: the last of `width` values becomes the first.
-    #[cfg(feature = "dem")]
-    pub(super) fn flip_rows(&mut self, width: usize) {
-        flip(&mut self.exact, width);
-        flip(&mut self.wide, width);
-    }
-
     /// The heights in metres, each rounded once to f32.
     ///
     /// # Errors
@@ -251,8 +244,9 @@ pub(super) fn bare_description(name: &str, format: &str, sample_type: &str, size
 /// What `assumed` says where a file names no unit of heights.
 pub(super) const HEIGHTS_ASSUMED: &str = "The unit of heights is unknown and taken as metres.";
 
+/// Turns the order of rows about: the last of `width` values becomes the first.
 #[cfg(feature = "dem")]
-fn flip<T>(values: &mut [T], width: usize) {
+pub(super) fn flip<T>(values: &mut [T], width: usize) {
     let rows = values.len() / width.max(1);
     for z in 0..rows / 2 {
         let (north, south) = values.split_at_mut((rows - 1 - z) * width);

@@ -13,6 +13,8 @@ mod openexr;
 mod options;
 #[cfg(feature = "dem")]
 mod png;
+#[cfg(feature = "dem")]
+mod processors;
 mod read_at;
 mod synth;
 #[cfg(feature = "dem")]
@@ -64,4 +66,42 @@ pub trait HeightSource: Send + Sync {
     /// # Errors
     /// Where the file is damaged, vanished, or uses what this crate does not read.
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()>;
+
+    /// What all reads so far have met; zeros where a source does not count.
+    fn reads(&self) -> Reads {
+        Reads::default()
+    }
+
+    /// Coarser copies of itself that the file holds, the finest first, for a quick look: they are filtered and rounded
+    /// as their writer chose, and lie beside the samples of the pyramid's levels.
+    ///
+    /// # Errors
+    /// Where one is damaged, or uses what this crate does not read.
+    fn overviews(&self) -> Result<Vec<Overview>> {
+        Ok(Vec::new())
+    }
+}
+
+/// What reading a file has met so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reads {
+    /// Blocks (strips, tiles) of which the file consists.
+    pub blocks: u64,
+    /// Blocks decoded, each as often as it was.
+    pub decoded: u64,
+    /// Samples given as no data because they are infinite or beyond f32, each as often as it was read.
+    pub infinite: u64,
+}
+
+/// A coarser copy of a DEM, and where its samples lie.
+///
+/// Its sample in column i lies over column `i * step[0] + shift[0]` of the DEM, likewise for rows.
+pub struct Overview {
+    /// Its heights, above the DEM's own base.
+    pub source: Box<dyn HeightSource>,
+    /// Columns and rows of the DEM to one of the overview.
+    pub step: [f64; 2],
+    /// Column and row of the DEM over which the overview's first sample lies: half a step less half a sample, as a
+    /// pixel of an overview covers whole pixels.
+    pub shift: [f64; 2],
 }
