@@ -80,11 +80,8 @@ fn unpacked(file: &File, layout: &Layout, index: usize, row: i64) -> Result<Opti
         return Ok(None);
     };
     let row_bytes = layout.row_bytes();
-    let rows = if layout.tiled {
-        layout.stored_rows
-    } else {
-        layout.stored_rows.min(layout.height - row * layout.stored_rows)
-    };
+    // Not the rows below the image, even of a tile: some writers leave them out.
+    let rows = layout.stored_rows.min(layout.height - row * layout.stored_rows);
     let name = || format!("{} {index}", ["strip", "tile"][usize::from(layout.tiled)]);
     let wanted = u128::from(row_bytes) * rows as u128;
     let holds = u128::from(count) * u128::from(MAX_COMPRESSION);
@@ -181,14 +178,10 @@ fn band(layout: &Layout, raw: Vec<u8>, [columns, rows]: [i64; 2]) -> Vec<u8> {
     out
 }
 
-/// Sample `index` of a row of samples that do not fill whole bytes: the first in the highest bits, but for those of
-/// three bytes, which stand in the file's order.
+/// Sample `index` of a row of samples of odd size: the first in the highest bits, whatever the file's order, as GDAL
+/// has it for those of three bytes too.
 fn bits_of(layout: &Layout, row: &[u8], index: usize) -> u32 {
     let bits = usize::from(layout.bits);
-    if bits == 24 && layout.order == Order::Little {
-        let at = 3 * index;
-        return u32::from_le_bytes([row[at], row[at + 1], row[at + 2], 0]);
-    }
     let start = index * bits;
     let mut value = 0u64;
     let last = (start + bits - 1) / 8;

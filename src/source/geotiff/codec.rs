@@ -140,26 +140,36 @@ fn packbits(stored: &[u8], out: &mut [u8]) -> Result<(), String> {
 
 fn zstd(stored: &[u8], out: &mut [u8]) -> Result<(), String> {
     let damaged = |error: &dyn std::fmt::Display| format!("has damaged zstd data: {error}");
-    // The library takes memory for the window that the frame asks for.
     let window = zstd_window(stored).ok_or("has no zstd data where they are expected")?;
-    if window > (out.len() as u64 * 2).max(FREE_WINDOW_BYTES) {
-        return Err(format!(
-            "has zstd data that ask for a window of {window} bytes, for {} bytes of samples",
-            out.len()
-        ));
+    // The library takes memory for the window that the frame asks for, which is often far more than a block: no match
+    // in what is wanted reaches back further than to its start.
+    let enough = (out.len() as u64).next_power_of_two().max(LEAST_WINDOW_BYTES);
+    let (head, rest) = stored.split_at(6);
+    let mut head = head.to_vec();
+    if window > enough {
+        if head[4] & SINGLE_SEGMENT != 0 {
+            return Err(format!(
+                "has zstd data of {window} bytes for {} bytes of samples",
+                out.len()
+            ));
+        }
+        head[5] = ((enough.trailing_zeros() - 10) << 3) as u8;
     }
-    let mut stream = ruzstd::decoding::StreamingDecoder::new(stored).map_err(|e| damaged(&e))?;
+    let mut stream =
+        ruzstd::decoding::StreamingDecoder::new((&head[..]).chain(rest)).map_err(|e| damaged(&e))?;
     stream.read_exact(out).map_err(|e| damaged(&e))
 }
 
-/// A window of zstd may always be this large: that of its usual levels.
-const FREE_WINDOW_BYTES: u64 = 8 << 20;
+/// The least window that is asked for: a block of zstd holds no more.
+const LEAST_WINDOW_BYTES: u64 = 128 << 10;
+/// The bit of a frame's descriptor that makes its window its whole content.
+const SINGLE_SEGMENT: u8 = 0x20;
 
 /// The window that a zstd frame asks for, from its header (RFC 8878, section 3.1.1.1); none for what is no frame.
 fn zstd_window(stored: &[u8]) -> Option<u64> {
     let rest = stored.strip_prefix(&[0x28, 0xb5, 0x2f, 0xfd])?;
     let (descriptor, rest) = rest.split_first()?;
-    if descriptor & 0x20 == 0 {
+    if descriptor & SINGLE_SEGMENT == 0 {
         let window = *rest.first()?;
         let base = 1u64 << (10 + (window >> 3));
         return Some(base + base / 8 * u64::from(window & 7));
@@ -244,15 +254,18 @@ mod tests {
     }
 
     #[test]
-    fn a_window_beyond_need_is_refused_before_memory_is_taken() {
-        // No single segment, window of 2^(10 + 31) bytes.
-        let frame = [0x28, 0xb5, 0x2f, 0xfd, 0x00, 0xf8, 0x01, 0, 0];
+    fn a_window_beyond_need_takes_no_memory() {
+        // A frame of one raw block of two bytes that asks for a window of 2^(10 + 31) bytes.
+        let frame = [0x28, 0xb5, 0x2f, 0xfd, 0x00, 0xf8, 0x11, 0, 0, b'h', b'i'];
         assert_eq!(zstd_window(&frame), Some(1 << 41));
-        let error = Compression::Zstd.unpack(&frame, &mut [0; 9]).unwrap_err();
-        assert!(error.contains("window of 2199023255552 bytes"), "{error}");
+        let mut out = [0; 2];
+        Compression::Zstd.unpack(&frame, &mut out).unwrap();
+        assert_eq!(&out, b"hi");
         // A single segment of 2^56 bytes.
         let frame = [0x28, 0xb5, 0x2f, 0xfd, 0xe0, 0, 0, 0, 0, 0, 0, 0, 1, 0];
         assert_eq!(zstd_window(&frame), Some(1 << 56));
+        let error = Compression::Zstd.unpack(&frame, &mut [0; 9]).unwrap_err();
+        assert!(error.contains("72057594037927936 bytes for 9 bytes"), "{error}");
         assert_eq!(zstd_window(&[0x28, 0xb5, 0x2f, 0xfd, 0x20, 9]), Some(9));
         assert_eq!(
             zstd_window(&[0x28, 0xb5, 0x2f, 0xfd, 0x60, 9, 1]),

@@ -279,14 +279,6 @@ impl File {
         Ok(Some(out))
     }
 
-    /// The first whole number of a tag; none where it is missing or empty.
-    ///
-    /// # Errors
-    /// As [`File::whole`].
-    pub(super) fn number(&self, directory: &Directory, tag: u16) -> Result<Option<u64>> {
-        Ok(self.whole(directory, tag, 1)?.and_then(|v| v.first().copied()))
-    }
-
     /// The one whole number of a tag, or `default` where it is missing.
     ///
     /// # Errors
@@ -402,14 +394,19 @@ mod tests {
         bytes.extend(b"\x01\0\0\0\x02\0\0\0nan\0x");
         let (tiff, first) = file(&bytes).unwrap();
         let directory = tiff.directory(first).unwrap();
-        assert_eq!(tiff.number(&directory, WIDTH).unwrap(), Some(7));
+        assert_eq!(tiff.scalar(&directory, WIDTH, None).unwrap(), 7);
         assert_eq!(
             tiff.whole(&directory, STRIP_OFFSETS, 9).unwrap(),
             Some(vec![1, 2])
         );
         assert_eq!(tiff.whole(&directory, STRIP_OFFSETS, 1).unwrap(), Some(vec![1]));
         assert_eq!(tiff.text(&directory, GDAL_NODATA).unwrap(), "nan");
-        assert_eq!(tiff.number(&directory, HEIGHT).unwrap(), None);
+        assert_eq!(tiff.scalar(&directory, HEIGHT, Some(3)).unwrap(), 3);
+        assert!(tiff.scalar(&directory, HEIGHT, None).is_err());
+        assert!(
+            tiff.scalar(&directory, STRIP_OFFSETS, None).is_err(),
+            "two values"
+        );
         assert!(tiff.whole(&directory, STRIP_BYTES, u64::MAX).is_err());
         assert!(tiff.reals(&directory, STRIP_BYTES).is_err());
         assert!(tiff.whole(&directory, GDAL_NODATA, 1).is_err());

@@ -248,6 +248,10 @@ fn sample_type(file: &File, directory: &Directory, bands: u64) -> Result<(Kind, 
     };
     let (bits, format) = (all(ifd::BITS, 1)?, all(ifd::SAMPLE_FORMAT, 1)?);
     let kind = match (format, bits) {
+        (1 | 4, 24) if file.order == Order::Big => {
+            let what = "has whole numbers of 24 bits, greatest byte first, which programs read differently";
+            return Err(file.unsupported(what));
+        }
         (1 | 4, 1..=8) => Kind::U8,
         (1 | 4, 9..=16) => Kind::U16,
         (1 | 4, 17..=32) => Kind::U32,

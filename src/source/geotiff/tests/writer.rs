@@ -70,7 +70,7 @@ impl Image {
     /// A stored row: its samples after the predictor.
     fn row(&self, bands: &[usize], xs: std::ops::Range<usize>, z: usize, big: bool) -> Vec<u8> {
         let place = |x: usize| (x.min(self.width - 1), z.min(self.height - 1));
-        if self.bits % 8 != 0 {
+        if ![8, 16, 32, 64].contains(&self.bits) {
             let mut bits = Vec::new();
             for x in xs {
                 let (x, z) = place(x);
