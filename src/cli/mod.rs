@@ -2,6 +2,7 @@
 //! error, an error as one line: `clipscape: SUBJECT: what is wrong; what to do`.
 
 mod args;
+mod heights;
 mod info;
 mod input;
 mod preprocess;

@@ -3,6 +3,7 @@
 use super::ifd::{self, Directory, File};
 use crate::error::{Error, ErrorKind, Result};
 use crate::source::geographic::Ellipsoid;
+use crate::source::georeference::LENGTHS;
 
 // Keys.
 const MODEL_TYPE: u16 = 1024;
@@ -47,13 +48,8 @@ pub(super) struct Keys {
 
 /// Name and length in metres of an EPSG unit of length.
 pub(super) fn linear_unit(code: u16) -> Option<(&'static str, f64)> {
-    match code {
-        9001 => Some(("metre", 1.0)),
-        9002 => Some(("foot", 0.3048)),
-        9003 => Some(("US survey foot", 1200.0 / 3937.0)),
-        9036 => Some(("kilometre", 1000.0)),
-        _ => None,
-    }
+    let index = [9001, 9002, 9003, 9036].iter().position(|known| *known == code)?;
+    Some(LENGTHS[index])
 }
 
 impl Keys {
