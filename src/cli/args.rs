@@ -10,6 +10,8 @@ use clap::{Args, Parser, Subcommand};
 #[cfg(feature = "gpu")]
 pub(super) use self::render::{RenderArgs, ViewArgs};
 use super::values;
+#[cfg(feature = "dem")]
+use crate::build::PartKind;
 use crate::light::{DEFAULT_SKY_DIRECTIONS, Sun};
 
 /// A terrain geometry clipmap engine: from a DEM to frames, and how wrong they are.
@@ -32,6 +34,8 @@ pub(super) enum Command {
     Preprocess(PreprocessArgs),
     #[cfg(feature = "gpu")]
     Render(Box<RenderArgs>),
+    #[cfg(feature = "dem")]
+    Export(ExportArgs),
     #[cfg(feature = "dem")]
     Synth(SynthArgs),
 }
@@ -85,6 +89,35 @@ pub(super) struct PreprocessArgs {
     /// Write how long it took, and what it cost, as a line of JSON
     #[arg(long, value_name = "FILE")]
     pub(super) stats: Option<PathBuf>,
+
+    /// Replace what exists
+    #[arg(long, short)]
+    pub(super) force: bool,
+
+    /// Show no progress and no warnings
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+}
+
+/// Write a level's heights, light or error as a GeoTIFF that lies over the DEM.
+#[cfg(feature = "dem")]
+#[derive(Debug, Args)]
+pub(super) struct ExportArgs {
+    /// A terrain file, a DEM (its pyramid is built on the way where a level needs it), or synth:SIZE[:SEED]
+    pub(super) input: PathBuf,
+
+    /// What is written: height in metres, sun or sky (shares of 0 to 1), or error (metres by which the level's surface
+    /// lies above the DEM's own, at each of the DEM's samples)
+    #[arg(long, value_name = "PART", value_parser = values::part)]
+    pub(super) part: PartKind,
+
+    /// The level: 0 is the DEM itself, each further one has half as many samples a side [default: 0; 1 for error]
+    #[arg(long, value_name = "L")]
+    pub(super) level: Option<u32>,
+
+    /// The GeoTIFF
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: PathBuf,
 
     /// Replace what exists
     #[arg(long, short)]

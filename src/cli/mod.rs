@@ -2,6 +2,8 @@
 //! error, an error as one line: `clipscape: SUBJECT: what is wrong; what to do`.
 
 mod args;
+#[cfg(feature = "dem")]
+mod export;
 mod heights;
 mod info;
 mod input;
@@ -50,6 +52,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Preprocess(args) => preprocess::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "gpu")]
         Command::Render(args) => render::run(&args, &Terminal::new(args.quiet)),
+        #[cfg(feature = "dem")]
+        Command::Export(args) => export::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "dem")]
         Command::Synth(args) => synth::run(&args, &Terminal::new(args.quiet)),
     })

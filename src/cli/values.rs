@@ -1,5 +1,7 @@
 //! How numbers, suns and bytes are written. Each parser says what it wants.
 
+#[cfg(feature = "dem")]
+use crate::build::PartKind;
 use crate::light::Sun;
 
 /// A finite number.
@@ -30,6 +32,16 @@ pub(super) fn sun(text: &str) -> Result<Sun, String> {
     sun.check()
         .map_err(|_| "the altitude is outside of -90 to 90 degrees".to_string())?;
     Ok(sun)
+}
+
+/// A part of a terrain, by its name.
+#[cfg(feature = "dem")]
+pub(super) fn part(text: &str) -> Result<PartKind, String> {
+    let known = PartKind::NAMED.iter().find(|(name, _)| *name == text);
+    known.map(|(_, kind)| *kind).ok_or_else(|| {
+        let names = PartKind::NAMED.map(|(name, _)| name);
+        format!("not one of {}", names.join(", "))
+    })
 }
 
 /// Bytes: `4096`, `512M`, `2GiB`. K, M, G and T, with or without iB, are powers of 1024; KB to TB of 1000.
