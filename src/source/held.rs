@@ -35,14 +35,11 @@ impl HeightSource for Held {
     }
 
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {
-        let size = self.description.grid.size;
-        if !size.rect().contains_rect(rect) || out.len() as i64 != rect.area() {
-            let what = format!("{rect:?} with {} places does not fit {size:?}", out.len());
-            return Err(Error::new(ErrorKind::Misuse, &self.description.name, what));
-        }
+        self.description.check_rect(rect, out)?;
         if rect.is_empty() {
             return Ok(());
         }
+        let size = self.description.grid.size;
         for (z, row) in (rect.z0..rect.z1).zip(out.chunks_exact_mut(rect.width() as usize)) {
             let start = (z * size.width + rect.x0) as usize;
             row.copy_from_slice(&self.heights[start..start + row.len()]);
@@ -214,13 +211,18 @@ impl Values {
 impl Heights {
     /// What `assumed` says of infinite heights, if there were any.
     pub(super) fn infinite_sentence(&self) -> Option<String> {
-        match self.infinite {
-            0 => None,
-            1 => Some("One height is infinite or beyond f32; it is taken as no data.".into()),
-            n => Some(format!(
-                "{n} heights are infinite or beyond f32; they are taken as no data."
-            )),
-        }
+        infinite_sentence(self.infinite)
+    }
+}
+
+/// What is said of `count` infinite heights, if there are any.
+pub(super) fn infinite_sentence(count: u64) -> Option<String> {
+    match count {
+        0 => None,
+        1 => Some("One height is infinite or beyond f32; it is taken as no data.".into()),
+        n => Some(format!(
+            "{n} heights are infinite or beyond f32; they are taken as no data."
+        )),
     }
 }
 

@@ -1,11 +1,10 @@
 //! OpenEXR heightmaps: one channel of one part, f16, f32 or u32; NaN and infinities are no data.
 //!
-//! The channel is the first there is of `Y`, `Z`, `height`, `H`, `R`, or the only one. Blocks are decoded one
+//! The channel is the one asked for, else the first there is of `Y`, `Z`, `height`, `H`, `R`, or the only one. Blocks are decoded one
 //! after another, so that only the wanted channel is held.
 
 use std::collections::HashSet;
 use std::io::BufReader;
-use std::sync::Arc;
 
 use exr::block::reader::ChunksReader;
 use exr::compression::Compression;
@@ -14,14 +13,17 @@ use exr::meta::header::Header;
 use half::f16;
 
 use super::held::{Held, Scale, Values, bare_description, check_claim, size};
-use super::{Cursor, ReadAt};
+use super::open::Input;
+use super::{Band, Cursor};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Grid;
 
 const NAMES: [&str; 5] = ["Y", "Z", "height", "H", "R"];
 
 /// Reads the picture `name`.
-pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
+pub(super) fn open(input: &Input) -> Result<Held> {
+    let name = input.name;
+    let bytes = input.bytes.clone();
     let file_bytes = bytes.size_bytes();
     let failed = |error: exr::error::Error| refused(name, error);
     let reader = exr::block::read(BufReader::new(Cursor::new(bytes)), false).map_err(failed)?;
@@ -33,16 +35,32 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
         check_claim(name, width, height, pixel_bytes.max(1), file_bytes)?;
         check_claim(name, header.chunk_count as u64, 1, 1, file_bytes)?;
     }
-    let (layer, channel) = choose(headers).ok_or_else(|| {
+    let (layer, channel) = choose(headers, input.options.band.as_ref()).ok_or_else(|| {
         let names: Vec<String> = headers
             .iter()
             .flat_map(|h| &h.channels.list)
             .take(8)
             .map(|c| c.name.to_string())
             .collect();
-        let what = format!("has no channel of heights among {}", names.join(", "));
-        Error::new(ErrorKind::Unsupported, name, what)
-            .advice("give one channel, or one named Y, Z, height, H or R")
+        let names = names.join(", ");
+        match &input.options.band {
+            Some(Band::Name(band)) => Error::new(
+                ErrorKind::Misuse,
+                name,
+                format!("has no channel named {band:?} among {names}"),
+            ),
+            Some(Band::Number(n)) => Error::new(
+                ErrorKind::Misuse,
+                name,
+                format!("has no channel {n} among {names}"),
+            ),
+            None => Error::new(
+                ErrorKind::Unsupported,
+                name,
+                format!("has no channel of heights among {names}"),
+            ),
+        }
+        .advice("name one of them with --band")
     })?;
     let header = &headers[layer];
     let description = &header.channels.list[channel];
@@ -65,7 +83,7 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
     let sample_type = description.sample_type;
     let (width, height) = (header.layer_size.x(), header.layer_size.y());
     let mut assumed = Vec::new();
-    if headers.len() > 1 || header.channels.list.len() > 1 {
+    if input.options.band.is_none() && (headers.len() > 1 || header.channels.list.len() > 1) {
         let part = header
             .own_attributes
             .layer_name
@@ -107,18 +125,24 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
                 return Err(Error::new(ErrorKind::Broken, name, what));
             }
             let start = z * width + x;
+            // A no-data value is compared in the type of the samples.
+            let nodata = input.options.nodata;
+            let void_of = |void: bool, value: f64| if void { f64::NAN } else { value };
             match sample_type {
                 SampleType::F16 => set(name, &mut values, start, line.value, |b| {
-                    f16::from_ne_bytes(b).to_f64()
+                    let v = f16::from_ne_bytes(b);
+                    void_of(nodata.is_some_and(|n| f16::from_f64(n) == v), v.to_f64())
                 })?,
                 SampleType::F32 => {
                     set(name, &mut values, start, line.value, |b| {
-                        f64::from(f32::from_ne_bytes(b))
+                        let v = f32::from_ne_bytes(b);
+                        void_of(nodata.is_some_and(|n| n as f32 == v), v.into())
                     })?;
                 }
                 SampleType::U32 => {
                     set(name, &mut values, start, line.value, |b| {
-                        f64::from(u32::from_ne_bytes(b))
+                        let v = f64::from(u32::from_ne_bytes(b));
+                        void_of(nodata == Some(v), v)
                     })?;
                 }
             }
@@ -147,8 +171,9 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
     Held::new(description, heights.heights)
 }
 
-/// Part and channel that hold the heights.
-fn choose(headers: &[Header]) -> Option<(usize, usize)> {
+/// Part and channel that hold the heights: the ones asked for, of the first part that has such a channel; numbers count
+/// the channels of all parts.
+fn choose(headers: &[Header], band: Option<&Band>) -> Option<(usize, usize)> {
     let find = |name: &str| {
         headers.iter().enumerate().find_map(|(layer, header)| {
             let channel = header.channels.list.iter().position(|c| c.name.eq(name))?;
@@ -159,7 +184,17 @@ fn choose(headers: &[Header]) -> Option<(usize, usize)> {
         let [header] = headers else { return None };
         (header.channels.list.len() == 1).then_some((0, 0))
     };
-    NAMES.into_iter().find_map(find).or_else(only)
+    let all = || {
+        let channels = headers.iter().enumerate();
+        channels
+            .flat_map(|(layer, header)| (0..header.channels.list.len()).map(move |channel| (layer, channel)))
+    };
+    match band {
+        None => NAMES.into_iter().find_map(find).or_else(only),
+        // A channel of a layer within a part is named `layer.channel`.
+        Some(Band::Name(name)) => find(name),
+        Some(Band::Number(n)) => all().nth((*n as usize).checked_sub(1)?),
+    }
 }
 
 fn set<const N: usize>(
@@ -203,7 +238,7 @@ fn refused(name: &str, error: exr::error::Error) -> Error {
 
 #[cfg(test)]
 mod tests {
-    use super::super::HeightSource;
+    use super::super::{HeightSource, OpenOptions};
     use super::*;
     use crate::error::Result;
     use exr::prelude::*;
@@ -234,7 +269,11 @@ mod tests {
     }
 
     fn read(bytes: Vec<u8>) -> Result<(super::super::Description, Vec<f32>)> {
-        let held = open("t.exr", Arc::new(bytes))?;
+        read_with(bytes, &OpenOptions::default())
+    }
+
+    fn read_with(bytes: Vec<u8>, options: &OpenOptions) -> Result<(super::super::Description, Vec<f32>)> {
+        let held = open(&Input::bare("t.exr", bytes, options))?;
         let mut out = vec![0.0; held.description().grid.size.samples() as usize];
         held.read(held.description().grid.size.rect(), &mut out)?;
         Ok((held.description().clone(), out))
@@ -297,6 +336,32 @@ mod tests {
             "{:?}",
             d.assumed
         );
+    }
+
+    #[test]
+    fn any_channel_is_read_by_its_name_or_number() {
+        let flat = |v: f32| FlatSamples::F32(vec![v, -5.0]);
+        let bytes = encode(
+            vec![("A", flat(1.0)), ("depth.Z", flat(2.0)), ("Y", flat(3.0))],
+            (2, 1),
+            Compression::ZIP1,
+        );
+        let of = |band: Option<Band>, nodata| {
+            let options = OpenOptions {
+                band,
+                nodata,
+                ..OpenOptions::default()
+            };
+            read_with(bytes.clone(), &options).map(|(_, heights)| heights)
+        };
+        assert_eq!(of(None, None).unwrap(), [3.0, -5.0]);
+        assert_eq!(of(Some(Band::Name("depth.Z".into())), None).unwrap(), [2.0, -5.0]);
+        assert_eq!(of(Some(Band::Number(1)), None).unwrap(), [1.0, -5.0]);
+        assert!(of(None, Some(-5.0)).unwrap()[1].is_nan());
+        for band in [Band::Name("Z".into()), Band::Number(0), Band::Number(4)] {
+            let error = of(Some(band), None).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::Misuse, "{error}");
+        }
     }
 
     #[test]

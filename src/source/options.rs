@@ -131,6 +131,25 @@ impl OpenOptions {
         *self == Self::default()
     }
 
+    /// Refuses what speaks of a file's samples, for an input that is none.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`].
+    pub(super) fn refuse_of_file(&self, name: &str) -> Result<()> {
+        let given = [
+            (self.nodata.is_some(), "--nodata"),
+            (self.band.is_some(), "--band"),
+            (self.raw.is_some(), "--raw"),
+        ];
+        match given.iter().find(|(given, _)| *given) {
+            None => Ok(()),
+            Some((_, option)) => {
+                let what = format!("is no file of samples, to which {option} belongs");
+                Err(Error::new(ErrorKind::Misuse, name, what).advice("leave it out"))
+            }
+        }
+    }
+
     /// The band wanted, counted from 0, of `count` bands without names.
     ///
     /// # Errors
