@@ -36,7 +36,9 @@ pub(super) fn run(args: &ExportArgs, terminal: &Terminal) -> Outcome {
         Input::Dem(source) if args.part == PartKind::Height && level == 0 => write(source.as_ref())?,
         Input::Dem(source) if matches!(args.part, PartKind::Sun | PartKind::Sky) => {
             let error = Error::new(ErrorKind::Misuse, &source.description().name, "has no light");
-            return Err(error.advice("preprocess it, which traces light, and export from the terrain file").into());
+            return Err(error
+                .advice("preprocess it, which traces light, and export from the terrain file")
+                .into());
         }
         Input::Dem(source) => {
             let terrain = Terrain::from_source(source.as_ref(), terminal)?;

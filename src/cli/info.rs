@@ -5,18 +5,20 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::args::InfoArgs;
-use super::heights::{Heights, bounded_heights, read_heights};
 use super::input::{self, Input};
 use super::{Failure, Outcome, print, say};
-use crate::error::Result;
-use crate::grid::{Grid, Size};
-use crate::levels::Levels;
+use crate::error::{Error, Result};
+use crate::grid::{Grid, Rect, Size};
+use crate::levels::{Bounds, Levels};
 use crate::progress::Progress;
 use crate::source::{Description, Georeference, HeightSource, Registration};
 use crate::terrain::{LightMeta, TerrainFile};
 
 /// A DEM of at most this many samples is read to say its least and greatest height and its voids.
 const CHEAP_SAMPLES: i64 = 1 << 24;
+
+/// Samples read at once, where rows are not longer.
+const BAND_SAMPLES: i64 = 1 << 20;
 
 /// What `--json` prints, one object.
 #[derive(Debug, Serialize)]
@@ -38,8 +40,6 @@ struct Info {
     max: Option<f64>,
     /// Samples without data; null where that is not cheap to know.
     voids: Option<u64>,
-    /// Values that look like undeclared no data, and how many samples have each; null where that is not cheap to know.
-    suspects: Option<Vec<Suspect>>,
     /// The unit of heights as the file has them; `min` and `max` are metres. Null where it is not known.
     vertical_unit: Option<String>,
     /// What heights are measured from; null where that is not known.
@@ -64,20 +64,19 @@ struct Info {
     assumed: Vec<String>,
 }
 
-#[derive(Clone, Copy, Debug, Serialize)]
-struct Suspect {
-    /// The value, in metres.
-    value: f64,
-    /// Samples that have it.
-    samples: u64,
-}
-
 #[derive(Debug, Serialize)]
 struct Light {
     /// Azimuth and altitude of the sun in degrees.
     sun: [f64; 2],
     /// Directions in which the sky was looked for.
     sky_directions: u32,
+}
+
+/// Least and greatest height, less the grid's base, and voids.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Heights {
+    range: Option<[f32; 2]>,
+    voids: Option<u64>,
 }
 
 /// Runs the command.
@@ -113,20 +112,11 @@ fn of_dem(source: &dyn HeightSource, all: bool, progress: &dyn Progress) -> Resu
         vertical_unit,
         ..
     } = source.description();
-    let met = source.reads().infinite;
     let heights = if all || grid.size.samples() <= CHEAP_SAMPLES {
         read_heights(name, grid, progress, |rect, out| source.read(rect, out))?
     } else {
         Heights::default()
     };
-    let mut assumed = assumed.clone();
-    assumed.extend(match source.reads().infinite - met {
-        0 => None,
-        1 => Some("One height is infinite or beyond f32; it is taken as no data.".into()),
-        n => Some(format!(
-            "{n} heights are infinite or beyond f32; they are taken as no data."
-        )),
-    });
     Ok(Info::new(
         grid,
         format,
@@ -135,7 +125,7 @@ fn of_dem(source: &dyn HeightSource, all: bool, progress: &dyn Progress) -> Resu
         vertical_unit,
         heights,
         None,
-        &assumed,
+        assumed,
     ))
 }
 
@@ -161,6 +151,61 @@ fn of_terrain(file: &TerrainFile, all: bool, progress: &dyn Progress) -> Result<
     ))
 }
 
+/// Reads all heights, band by band.
+fn read_heights(
+    name: &str,
+    grid: &Grid,
+    progress: &dyn Progress,
+    read: impl Fn(Rect, &mut [f32]) -> Result<()>,
+) -> Result<Heights> {
+    let Size { width, height } = grid.size;
+    let rows = (BAND_SAMPLES / width).clamp(1, height);
+    let mut band = vec![0.0_f32; (rows * width) as usize];
+    let (mut voids, mut range) = (0, None);
+    progress.begin("read", height as u64);
+    for z in (0..height).step_by(rows as usize) {
+        if progress.cancelled() {
+            return Err(Error::cancelled(name));
+        }
+        let rect = Rect::new(0, z, width, (z + rows).min(height));
+        let band = &mut band[..rect.area() as usize];
+        read(rect, band)?;
+        for &h in band.iter() {
+            if h.is_nan() {
+                voids += 1;
+            } else {
+                widen(&mut range, h, h);
+            }
+        }
+        progress.advance(rect.height() as u64);
+    }
+    Ok(Heights {
+        range,
+        voids: Some(voids),
+    })
+}
+
+/// The range from the bounds of level 0, a row of patches at a time; they do not tell voids.
+fn bounded_heights(file: &TerrainFile) -> Result<Heights> {
+    let patches = file.grid().patches(0);
+    let mut row = vec![Bounds::VOID; patches.width as usize];
+    let mut range = None;
+    for b in 0..patches.height {
+        // As for heights: what is not there is an error.
+        file.bounds(0, Rect::new(0, b, patches.width, b + 1), &mut row)
+            .map(drop)?;
+        row.iter()
+            .filter(|bounds| !bounds.is_void())
+            .for_each(|p| widen(&mut range, p.min, p.max));
+    }
+    Ok(Heights { range, voids: None })
+}
+
+fn widen(range: &mut Option<[f32; 2]>, min: f32, max: f32) {
+    let [low, high] = range.unwrap_or([min, max]);
+    *range = Some([low.min(min), high.max(max)]);
+}
+
 impl Info {
     fn new(
         grid: &Grid,
@@ -183,12 +228,6 @@ impl Info {
             min: heights.range.map(|[min, _]| absolute(min)),
             max: heights.range.map(|[_, max]| absolute(max)),
             voids: heights.voids,
-            suspects: heights.voids.map(|_| {
-                let suspects = heights.suspects.iter();
-                suspects
-                    .map(|&(value, samples)| Suspect { value, samples })
-                    .collect()
-            }),
             vertical_unit: (!matches!(vertical_unit, "unknown" | "")).then(|| vertical_unit.into()),
             vertical_datum: place.and_then(|p| p.epsg()[1]).map(|code| format!("EPSG:{code}")),
             unit: place.map(|p| p.unit(grid.spacing_m[0])),
@@ -236,24 +275,9 @@ fn text(name: &str, info: &Info, verified: bool) -> String {
             format!("{voids} of {} samples", info.width * info.height),
         );
     }
-    for suspect in info.suspects.iter().flatten() {
-        let value = short(suspect.value);
-        line(
-            "",
-            format!(
-                "{} samples are {value}, which looks like no data that the file does not declare: --nodata {value}",
-                suspect.samples
-            ),
-        );
-    }
-    line(
-        "vertical",
-        format!(
-            "unit {}, datum {}",
-            info.vertical_unit.as_deref().unwrap_or("unknown"),
-            info.vertical_datum.as_deref().unwrap_or("unknown")
-        ),
-    );
+    let [unit, datum] =
+        [&info.vertical_unit, &info.vertical_datum].map(|known| known.as_deref().unwrap_or("unknown"));
+    line("vertical", format!("unit {unit}, datum {datum}"));
     match (info.extent, info.origin) {
         (Some([west, south, east, north]), Some([x, y])) => {
             let crs = info.crs.as_deref().unwrap_or("unknown reference system");
@@ -339,6 +363,35 @@ mod tests {
         ] {
             assert_eq!(short(value), text);
         }
+    }
+
+    #[test]
+    fn heights_are_gathered_over_bands_with_voids_apart() {
+        let grid = Grid {
+            base_m: 1000.0,
+            ..Grid::new(1500, 1500, [1.0, 1.0])
+        };
+        let heights = read_heights("t", &grid, &Silent, |rect, out| {
+            for ((x, z), h) in rect.cells().zip(out) {
+                *h = match (x, z) {
+                    (3, 1499) => -7.0,
+                    (1499, 0) => 9.0,
+                    (0, _) => f32::NAN,
+                    _ => 0.5,
+                };
+            }
+            Ok(())
+        });
+        let heights = heights.unwrap();
+        assert_eq!(
+            heights,
+            Heights {
+                range: Some([-7.0, 9.0]),
+                voids: Some(1500)
+            }
+        );
+        let info = Info::new(&grid, "test", "float32", None, "unknown", heights, None, &[]);
+        assert_eq!((info.min, info.max), (Some(993.0), Some(1009.0)));
     }
 
     #[test]

@@ -4,7 +4,6 @@
 mod args;
 #[cfg(feature = "dem")]
 mod export;
-mod heights;
 mod info;
 mod input;
 mod preprocess;

@@ -4,24 +4,30 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+
 use super::Outcome;
 use super::args::{RenderArgs, ViewArgs};
 use super::input::beside;
 use super::progress::Terminal;
 use crate::build::{Output, refuse_existing};
-use crate::camera::{Camera, Flight, check_picture, overview};
+use crate::camera::{Camera, CrsFlight, Flight, check_picture, is_crs, overview};
 use crate::clipmap::ClipmapOptions;
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu;
 use crate::grid::Grid;
 use crate::levels::Levels;
 use crate::progress::Progress;
+use crate::query::Places;
 use crate::render::{Headless, HeadlessOptions, Recording, picture};
 use crate::stats::{FrameStats, Run, SummaryStats};
 use crate::stream::Terrain;
 
 /// Vertical field of view where none is given, degrees.
 const FOV_DEG: f64 = 60.0;
+
+/// Metres above the ground where none are given: about a person's eyes.
+const ABOVE_M: f64 = 2.0;
 
 /// Clip size where none is given and the camera is among the terrain.
 const CLIP_SIZE: i64 = 256;
@@ -36,7 +42,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     check_picture(args.view.size)?;
     let flight = flight_json
         .as_ref()
-        .map(|(name, json)| Flight::parse(name, json))
+        .map(|(name, json)| Planned::parse(name, json))
         .transpose()?;
     let recording = Recording {
         folder: out.clone(),
@@ -47,7 +53,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     };
     match (&flight, args.flight.is_some()) {
         (Some(flight), _) => {
-            recording.check(flight)?;
+            recording.check(flight.times())?;
         }
         (None, true) => {
             // An orbit has the same frames around any DEM.
@@ -74,6 +80,8 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
 
     let terrain = Terrain::open(&args.input, terminal)?;
     warn_of_sun(args, &terrain, terminal);
+    let flight = flight.map(|flight| flight.over(&terrain)).transpose()?;
+    let camera = camera(args, &terrain)?;
     let mut headless = Headless::new(gpu, &terrain, &headless_options(&args.view, &terrain, &ring))?;
     if args.measure {
         headless.measure()?;
@@ -85,17 +93,15 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         .map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
     let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
     let aspect = f64::from(args.view.size[0]) / f64::from(args.view.size[1]);
-    let frames = match (flight, args.flight.is_some(), args.eye) {
+    let frames = match (flight, args.flight.is_some(), camera) {
         (Some(flight), ..) => recording.record(&mut headless, &terrain, &flight, terminal)?,
         (None, true, _) => {
             let orbit = Flight::orbit(terrain.grid(), low, high).scaled_down(scale)?;
             recording.record(&mut headless, &terrain, &orbit, terminal)?
         }
-        (None, false, eye) => {
-            let camera = match eye {
-                Some(eye) => camera(args, eye),
-                None => overview(terrain.grid(), low, high, aspect).scaled_down(scale),
-            };
+        (None, false, camera) => {
+            let whole = || overview(terrain.grid(), low, high, aspect).scaled_down(scale);
+            let camera = camera.unwrap_or_else(whole);
             vec![picture(
                 &out,
                 args.force,
@@ -204,14 +210,61 @@ fn read_flight(path: &Path) -> Result<(String, String)> {
     Ok((name, json))
 }
 
-fn camera(args: &RenderArgs, eye: [f64; 3]) -> Camera {
-    Camera {
-        eye: eye.into(),
-        heading_deg: args.heading.unwrap_or(0.0),
-        pitch_deg: args.pitch.unwrap_or(0.0),
+/// A flight before the terrain is open.
+enum Planned {
+    World(Flight),
+    Crs(CrsFlight),
+}
+
+impl Planned {
+    fn parse(name: &str, json: &str) -> Result<Self> {
+        if is_crs(json) {
+            CrsFlight::parse(name, json).map(Self::Crs)
+        } else {
+            Flight::parse(name, json).map(Self::World)
+        }
+    }
+
+    /// Its times; places in a reference system are not known yet.
+    fn times(&self) -> &Flight {
+        match self {
+            Self::World(flight) => flight,
+            Self::Crs(flight) => flight.times(),
+        }
+    }
+
+    fn over(self, terrain: &Terrain) -> Result<Flight> {
+        match self {
+            Self::World(flight) => Ok(flight),
+            Self::Crs(flight) => {
+                let places = Places::new(terrain, terrain.place(), terrain.name())?;
+                flight.resolve(|key| places.above(key.at, key.above_m).map(|eye| eye.to_array()))
+            }
+        }
+    }
+}
+
+/// The camera that is asked for, if one is.
+fn camera(args: &RenderArgs, terrain: &Terrain) -> Result<Option<Camera>> {
+    let places = || Places::new(terrain, terrain.place(), terrain.name());
+    let eye: DVec3 = match (args.eye, args.eye_at) {
+        (Some(eye), _) => eye.into(),
+        (None, Some(at)) => places()?.above(at, args.above.unwrap_or(ABOVE_M))?,
+        (None, None) => return Ok(None),
+    };
+    let (mut heading_deg, mut pitch_deg) = (args.heading.unwrap_or(0.0), args.pitch.unwrap_or(0.0));
+    if let Some(at) = args.look_at {
+        // As drawn: directions are those of the scaled world.
+        let drawn = DVec3::new(1.0, args.view.vertical_scale, 1.0);
+        (heading_deg, pitch_deg) = Camera::toward(eye * drawn, places()?.ground(at)? * drawn);
+    }
+    Ok(Some(Camera {
+        eye,
+        heading_deg,
+        pitch_deg,
         roll_deg: args.roll.unwrap_or(0.0),
         fov_deg: args.fov.unwrap_or(FOV_DEG),
-    }
+    }))
 }
 
 /// The clip size asked for, or one that suits the picture.
@@ -220,7 +273,9 @@ fn camera(args: &RenderArgs, eye: [f64; 3]) -> Camera {
 /// and the camera a distance D away, steps of `1.25 D / R` remain. They are to be about two pixels of the picture,
 /// `2 D tan(fov/2) / height` each, at the overview's 45 degrees: N = 1.5 times the picture's height.
 fn clip_size(args: &RenderArgs) -> i64 {
-    let whole = args.eye.is_none() && args.flight.as_deref().is_none_or(|f| f == Path::new("orbit"));
+    let whole = args.eye.is_none()
+        && args.eye_at.is_none()
+        && args.flight.as_deref().is_none_or(|f| f == Path::new("orbit"));
     match args.view.clip_size {
         Some(asked) => asked,
         None if whole => {

@@ -35,6 +35,7 @@ use super::processors::Processors;
 use super::{Description, HeightSource, OpenOptions, Overview, ReadAt, Reads};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
+use crate::progress::Progress;
 
 /// Later images of the file that are looked at for masks and overviews.
 const MAX_IMAGES: usize = 256;
@@ -183,6 +184,16 @@ impl HeightSource for GeoTiff {
 
     fn reads(&self) -> Reads {
         self.raster.reads()
+    }
+
+    fn remarks(&self, _: &dyn Progress) -> Result<Vec<String>> {
+        Ok(match self.raster.reads().infinite {
+            0 => Vec::new(),
+            1 => vec!["One height is infinite or beyond f32; it is taken as no data.".into()],
+            n => vec![format!(
+                "{n} heights are infinite or beyond f32; they are taken as no data."
+            )],
+        })
     }
 
     fn overviews(&self) -> Result<Vec<Overview>> {

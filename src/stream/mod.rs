@@ -13,7 +13,7 @@ use crate::levels::{Arrival, Bounds, Levels, LightSample};
 use crate::light::Sun;
 use crate::progress::Progress;
 use crate::pyramid::DEFAULT_LOBES;
-use crate::source::{self, Description, HeightSource, OpenOptions, ReadAt, Synth};
+use crate::source::{self, Description, Georeference, HeightSource, OpenOptions, ReadAt, Synth};
 use crate::terrain::{Meta, TerrainFile, is_terrain};
 
 /// A terrain, shared by any number of views.
@@ -108,6 +108,14 @@ impl Terrain {
     /// What it was made from.
     pub fn origin(&self) -> &Origin {
         &self.origin
+    }
+
+    /// Where it lies, if its file says.
+    pub fn place(&self) -> Option<&Georeference> {
+        match &self.origin {
+            Origin::File(meta) => meta.place.as_ref(),
+            Origin::Dem(description) => description.place.as_ref(),
+        }
     }
 
     /// The sun whose light was traced, where there is light.

@@ -171,6 +171,8 @@ fn no_data_is_compared_in_the_type_of_the_samples() {
     let source = source.unwrap();
     source.read(Rect::new(0, 0, 4, 1), &mut [0.0; 4]).unwrap();
     assert_eq!(source.reads().infinite, 1);
+    let remarks = source.remarks(&crate::progress::Silent).unwrap();
+    assert!(remarks[0].starts_with("One height is infinite"), "{remarks:?}");
 }
 
 #[test]
