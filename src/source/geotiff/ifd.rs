@@ -191,16 +191,12 @@ impl File {
             }
         });
         let entries = entries.collect();
-        // The pointer to the next directory may be cut off behind the last; then there is none.
         let end = start + table.len() as u64;
         let next = match self.big {
-            true => self.array::<8>(end).map(|bytes| self.order.number(bytes)),
-            false => self.array::<4>(end).map(|bytes| self.order.number(bytes)),
+            true => self.order.number(self.array::<8>(end)?),
+            false => self.order.number(self.array::<4>(end)?),
         };
-        Ok(Directory {
-            entries,
-            next: next.unwrap_or(0),
-        })
+        Ok(Directory { entries, next })
     }
 
     /// A number of 4 or 8 bytes.

@@ -102,6 +102,12 @@ impl Layout {
         };
         let (width, height) = (size(ifd::WIDTH, "columns")?, size(ifd::HEIGHT, "rows")?);
         let bands = scalar(ifd::BANDS, Some(1))?;
+        if band >= bands {
+            return Err(file.broken(format!(
+                "has an image of {bands} bands, and band {} is read",
+                band + 1
+            )));
+        }
         let (kind, bits) = sample_type(file, directory, bands)?;
         let compression = Compression::of(file, scalar(ifd::COMPRESSION, Some(1))?)?;
         check_colours(file, scalar(ifd::PHOTOMETRIC, Some(1))?)?;

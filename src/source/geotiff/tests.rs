@@ -1,5 +1,6 @@
 //! Tests of the GeoTIFF reader on images that the tests write.
 
+mod damage;
 mod layouts;
 mod places;
 mod refusals;

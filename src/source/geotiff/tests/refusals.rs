@@ -80,7 +80,7 @@ fn what_is_no_grid_of_heights_is_unsupported() {
 #[test]
 fn damage_is_broken_and_claims_are_limited() {
     let whole = encode::<GrayI16>([40, 40], &[7; 1600], &Extra::default());
-    for keep in [3, 7, 9, 60, whole.len() / 2, whole.len() - 9] {
+    for keep in [3, 7, 9, 60, whole.len() / 2, whole.len() - 1] {
         let error = read(whole[..keep].to_vec()).unwrap_err();
         assert_eq!(
             error.kind(),
