@@ -1,5 +1,6 @@
 //! What may be typed: commands, their options, and the help of each.
 
+mod input;
 #[cfg(feature = "gpu")]
 mod render;
 
@@ -7,6 +8,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+pub(super) use self::input::InputArgs;
 #[cfg(feature = "gpu")]
 pub(super) use self::render::{RenderArgs, ViewArgs};
 use super::values;
@@ -39,8 +41,8 @@ pub(super) enum Command {
 /// Say what a DEM or terrain file is, and what was assumed of it.
 #[derive(Debug, Args)]
 pub(super) struct InfoArgs {
-    /// A DEM, a terrain file, or synth:SIZE[:SEED]
-    pub(super) input: PathBuf,
+    #[command(flatten)]
+    pub(super) input: InputArgs,
 
     /// Print one JSON object
     #[arg(long)]
@@ -58,8 +60,8 @@ pub(super) struct InfoArgs {
 /// Make a terrain file of a DEM: all its levels, their bounds, and light.
 #[derive(Debug, Args)]
 pub(super) struct PreprocessArgs {
-    /// A DEM, or synth:SIZE[:SEED]
-    pub(super) input: PathBuf,
+    #[command(flatten)]
+    pub(super) input: InputArgs,
 
     /// The terrain file [default: STEM.terrain.exr beside the input]
     #[arg(long, short, value_name = "FILE")]
