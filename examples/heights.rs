@@ -1,7 +1,8 @@
 //! Writes all heights of a DEM, as a program of one's own would read them: metres as little-endian f64, row by row from
 //! the north, NaN for no data. Comparisons with other programs read them.
 //!
-//! `cargo run --example heights -- OUT INPUT... [--band N|NAME]`; prints columns, rows and the type of samples.
+//! `cargo run --example heights -- OUT INPUT... [--band N|NAME]`; prints columns, rows, the base height and the type of
+//! samples.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -56,8 +57,6 @@ fn write(out: &str, inputs: &[String], options: &OpenOptions) -> Result<String> 
         }
     }
     file.flush().map_err(failed)?;
-    Ok(format!(
-        "{} {} {}",
-        size.width, size.height, description.sample_type
-    ))
+    let kind = &description.sample_type;
+    Ok(format!("{} {} {base_m:?} {kind}", size.width, size.height))
 }
