@@ -29,7 +29,7 @@ use corpus::Format;
 use mutate::{Random, mutate};
 
 /// Rounds of the short form.
-const ROUNDS: u64 = 400;
+const ROUNDS: u64 = 4000;
 /// Memory that any file may take.
 const FREE_BYTES: u64 = 64 << 20;
 /// The longest that a file of some kilobytes may take, on a machine that does other things too.
@@ -136,7 +136,13 @@ fn fuzz(format: &Format) {
         }
         // Each round depends on its number alone, so that one can be run again.
         let mut random = Random::new(seed, round);
-        let (name, bytes) = all[random.below(all.len())];
+        // Files that are whole lead deeper.
+        let of = if random.below(4) == 0 {
+            all.len()
+        } else {
+            format.files.len()
+        };
+        let (name, bytes) = all[random.below(of)];
         let other = all[random.below(all.len())].1;
         let damaged = mutate(bytes, other, &mut random);
         if seconds.is_some() {
