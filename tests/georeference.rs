@@ -301,7 +301,7 @@ mod program {
         fails(
             here,
             &["export", "h.tif", "--part", "height", "-o", "h.tif", "-f"],
-            "is the input itself",
+            "is an input",
         );
         fails(
             here,

@@ -1,5 +1,6 @@
 //! What may be typed: commands, their options, and the help of each.
 
+mod input;
 #[cfg(feature = "gpu")]
 mod render;
 
@@ -7,6 +8,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+pub(super) use self::input::InputArgs;
 #[cfg(feature = "gpu")]
 pub(super) use self::render::{RenderArgs, ViewArgs};
 use super::values;
@@ -43,8 +45,8 @@ pub(super) enum Command {
 /// Say what a DEM or terrain file is, and what was assumed of it.
 #[derive(Debug, Args)]
 pub(super) struct InfoArgs {
-    /// A DEM, a terrain file, or synth:SIZE[:SEED]
-    pub(super) input: PathBuf,
+    #[command(flatten)]
+    pub(super) input: InputArgs,
 
     /// Print one JSON object
     #[arg(long)]
@@ -62,8 +64,8 @@ pub(super) struct InfoArgs {
 /// Make a terrain file of a DEM: all its levels, their bounds, and light.
 #[derive(Debug, Args)]
 pub(super) struct PreprocessArgs {
-    /// A DEM, or synth:SIZE[:SEED]
-    pub(super) input: PathBuf,
+    #[command(flatten)]
+    pub(super) input: InputArgs,
 
     /// The terrain file [default: STEM.terrain.exr beside the input]
     #[arg(long, short, value_name = "FILE")]
@@ -99,12 +101,13 @@ pub(super) struct PreprocessArgs {
     pub(super) quiet: bool,
 }
 
-/// Write a level's heights, light or error as a GeoTIFF that lies over the DEM.
+/// Write a level's heights, light or error as a GeoTIFF that lies over the DEM. Of a DEM the pyramid is built on the
+/// way where a level needs it.
 #[cfg(feature = "dem")]
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {
-    /// A terrain file, a DEM (its pyramid is built on the way where a level needs it), or synth:SIZE[:SEED]
-    pub(super) input: PathBuf,
+    #[command(flatten)]
+    pub(super) input: InputArgs,
 
     /// What is written: height in metres, sun or sky (shares of 0 to 1), or error (metres by which the level's surface
     /// lies above the DEM's own, at each of the DEM's samples)

@@ -1,7 +1,6 @@
 //! `clipscape export`: a part of a terrain as a georeferenced GeoTIFF.
 
 use std::io::BufWriter;
-use std::path::Path;
 
 use super::Outcome;
 use super::args::ExportArgs;
@@ -9,7 +8,7 @@ use super::input::{self, Input};
 use super::progress::Terminal;
 use super::synth::refuse_other_formats;
 use crate::build::{Output, Part, PartKind};
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, ErrorKind};
 use crate::levels::Levels;
 use crate::source::{Description, HeightSource, write_tiff};
 use crate::stream::Terrain;
@@ -18,7 +17,7 @@ use crate::terrain::TerrainFile;
 /// Runs the command.
 pub(super) fn run(args: &ExportArgs, terminal: &Terminal) -> Outcome {
     refuse_other_formats(&args.output)?;
-    refuse_input(&args.input, &args.output)?;
+    input::refuse_own(&args.input, &args.output)?;
     let level = args.level.unwrap_or(u32::from(args.part == PartKind::Error));
     // Made first: where it cannot be, that is said before the work and not after it.
     let (output, file) = Output::create(&args.output, args.force)?;
@@ -62,18 +61,5 @@ fn description(file: &TerrainFile) -> Description {
         vertical_unit: meta.vertical_unit.clone(),
         assumed: meta.assumed.clone(),
         name: file.name().into(),
-    }
-}
-
-/// Replacing an input by what was made of it would lose it.
-fn refuse_input(input: &Path, output: &Path) -> Result<()> {
-    match (std::fs::canonicalize(input), std::fs::canonicalize(output)) {
-        (Ok(a), Ok(b)) if a == b => {
-            Err(
-                Error::new(ErrorKind::Misuse, output.display(), "is the input itself")
-                    .advice("choose another name"),
-            )
-        }
-        _ => Ok(()),
     }
 }

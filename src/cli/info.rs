@@ -6,12 +6,13 @@ use serde::Serialize;
 
 use super::args::InfoArgs;
 use super::input::{self, Input};
+use super::suspects::Suspects;
 use super::{Failure, Outcome, print, say};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Rect, Size};
 use crate::levels::{Bounds, Levels};
 use crate::progress::Progress;
-use crate::source::{Description, Georeference, HeightSource, Registration};
+use crate::source::{self, Description, Georeference, HeightSource, Registration};
 use crate::terrain::{LightMeta, TerrainFile};
 
 /// A DEM of at most this many samples is read to say its least and greatest height and its voids.
@@ -62,6 +63,8 @@ struct Info {
     light: Option<Light>,
     /// What was assumed because the file does not say, as sentences.
     assumed: Vec<String>,
+    /// What a look at the samples showed that a user should know, as sentences.
+    noticed: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -72,11 +75,12 @@ struct Light {
     sky_directions: u32,
 }
 
-/// Least and greatest height, less the grid's base, and voids.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Least and greatest height, less the grid's base, voids, and what looks like voids that nobody declared.
+#[derive(Clone, Debug, Default, PartialEq)]
 struct Heights {
     range: Option<[f32; 2]>,
     voids: Option<u64>,
+    suspects: Suspects,
 }
 
 /// Runs the command.
@@ -98,7 +102,7 @@ pub(super) fn run(args: &InfoArgs, progress: &dyn Progress) -> Outcome {
         let json = serde_json::to_string(&info).expect("finite numbers and text are valid JSON");
         return print(&(json + "\n"));
     }
-    print(&text(&args.input.display().to_string(), &info, args.verify))
+    print(&text(&source::name_of(&args.input.inputs), &info, args.verify))
 }
 
 fn of_dem(source: &dyn HeightSource, all: bool, progress: &dyn Progress) -> Result<Info> {
@@ -112,12 +116,15 @@ fn of_dem(source: &dyn HeightSource, all: bool, progress: &dyn Progress) -> Resu
         vertical_unit,
         ..
     } = source.description();
+    let suspects = Suspects::new(source.description());
     let heights = if all || grid.size.samples() <= CHEAP_SAMPLES {
-        read_heights(name, grid, progress, |rect, out| source.read(rect, out))?
+        read_heights(name, grid, suspects, progress, |rect, out| source.read(rect, out))?
     } else {
         Heights::default()
     };
-    Ok(Info::new(
+    let mut noticed = source.remarks(progress)?;
+    noticed.extend(heights.suspects.sentences());
+    let mut info = Info::new(
         grid,
         format,
         sample_type,
@@ -126,13 +133,15 @@ fn of_dem(source: &dyn HeightSource, all: bool, progress: &dyn Progress) -> Resu
         heights,
         None,
         assumed,
-    ))
+    );
+    info.noticed = noticed;
+    Ok(info)
 }
 
 fn of_terrain(file: &TerrainFile, all: bool, progress: &dyn Progress) -> Result<Info> {
     let (grid, meta) = (file.grid(), file.meta());
     let heights = if all || grid.size.samples() <= CHEAP_SAMPLES {
-        read_heights(file.name(), grid, progress, |rect, out| {
+        read_heights(file.name(), grid, Suspects::default(), progress, |rect, out| {
             // A file that is open has all its data, or answers with an error.
             file.heights(0, rect, out).map(drop)
         })?
@@ -155,6 +164,7 @@ fn of_terrain(file: &TerrainFile, all: bool, progress: &dyn Progress) -> Result<
 fn read_heights(
     name: &str,
     grid: &Grid,
+    mut suspects: Suspects,
     progress: &dyn Progress,
     read: impl Fn(Rect, &mut [f32]) -> Result<()>,
 ) -> Result<Heights> {
@@ -175,6 +185,7 @@ fn read_heights(
                 voids += 1;
             } else {
                 widen(&mut range, h, h);
+                suspects.look_at(h);
             }
         }
         progress.advance(rect.height() as u64);
@@ -182,6 +193,7 @@ fn read_heights(
     Ok(Heights {
         range,
         voids: Some(voids),
+        suspects,
     })
 }
 
@@ -198,7 +210,10 @@ fn bounded_heights(file: &TerrainFile) -> Result<Heights> {
             .filter(|bounds| !bounds.is_void())
             .for_each(|p| widen(&mut range, p.min, p.max));
     }
-    Ok(Heights { range, voids: None })
+    Ok(Heights {
+        range,
+        ..Heights::default()
+    })
 }
 
 fn widen(range: &mut Option<[f32; 2]>, min: f32, max: f32) {
@@ -246,6 +261,7 @@ impl Info {
                 sky_directions: l.sky_directions,
             }),
             assumed: assumed.to_vec(),
+            noticed: Vec::new(),
         }
     }
 }
@@ -318,6 +334,9 @@ fn text(name: &str, info: &Info, verified: bool) -> String {
     for sentence in &info.assumed {
         line("assumed", sentence.clone());
     }
+    for sentence in &info.noticed {
+        line("noticed", sentence.clone());
+    }
     if verified {
         line("verified", "all of it was read, and is whole".into());
     }
@@ -371,7 +390,7 @@ mod tests {
             base_m: 1000.0,
             ..Grid::new(1500, 1500, [1.0, 1.0])
         };
-        let heights = read_heights("t", &grid, &Silent, |rect, out| {
+        let heights = read_heights("t", &grid, Suspects::default(), &Silent, |rect, out| {
             for ((x, z), h) in rect.cells().zip(out) {
                 *h = match (x, z) {
                     (3, 1499) => -7.0,
@@ -387,7 +406,8 @@ mod tests {
             heights,
             Heights {
                 range: Some([-7.0, 9.0]),
-                voids: Some(1500)
+                voids: Some(1500),
+                suspects: Suspects::default(),
             }
         );
         let info = Info::new(&grid, "test", "float32", None, "unknown", heights, None, &[]);
@@ -397,7 +417,7 @@ mod tests {
     #[test]
     fn all_void_is_said_as_such() {
         let grid = Grid::new(3, 2, [1.0, 1.0]);
-        let heights = read_heights("t", &grid, &Silent, |_, out| {
+        let heights = read_heights("t", &grid, Suspects::default(), &Silent, |_, out| {
             out.fill(f32::NAN);
             Ok(())
         });

@@ -10,6 +10,7 @@ mod preprocess;
 mod progress;
 #[cfg(feature = "gpu")]
 mod render;
+mod suspects;
 #[cfg(feature = "dem")]
 mod synth;
 mod values;
@@ -165,7 +166,7 @@ mod tests {
             ),
             (
                 "clipscape info",
-                "the following required arguments were not provided: <INPUT>; see --help",
+                "the following required arguments were not provided: <INPUT>...; see --help",
             ),
             (
                 "clipscape preprocess a.tif --sun 0,99",

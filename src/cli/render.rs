@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::Outcome;
 use super::args::{RenderArgs, ViewArgs};
-use super::input::beside;
+use super::input::{beside, first};
 use super::progress::Terminal;
 use crate::build::{Output, refuse_existing};
 use crate::camera::{Camera, CrsFlight, Flight, check_picture, is_crs, overview};
@@ -20,6 +20,7 @@ use crate::levels::Levels;
 use crate::progress::Progress;
 use crate::query::Places;
 use crate::render::{Headless, HeadlessOptions, Recording, picture};
+use crate::source;
 use crate::stats::{FrameStats, Run, SummaryStats};
 use crate::stream::Terrain;
 
@@ -78,7 +79,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         .transpose()?;
     let gpu = gpu::open()?;
 
-    let terrain = Terrain::open(&args.input, terminal)?;
+    let terrain = Terrain::open_with(&args.input.inputs, &args.input.read.options(), terminal)?;
     warn_of_sun(args, &terrain, terminal);
     let flight = flight.map(|flight| flight.over(&terrain)).transpose()?;
     let camera = camera(args, &terrain)?;
@@ -124,7 +125,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
             driver: headless.gpu().driver(),
             command: command_line(),
             flight_checksum: flight_json.as_ref().map(|(_, json)| checksum(json.as_bytes())),
-            input_checksum: file_checksum(&args.input)?,
+            input_checksum: files_checksum(&source::files_of(&args.input.inputs)?)?,
             faults: faults.len() as u64,
         };
         write_stats(&file, path, &frames, run)?;
@@ -175,11 +176,12 @@ fn refuse_same_files(args: &RenderArgs, out: &Path) -> Result<()> {
         .chain([args.animation.as_deref(), args.contact_sheet.as_deref()])
         .flatten()
         .collect();
-    let inputs = [Some(args.input.as_path()), args.flight.as_deref()];
+    let files = source::files_of(&args.input.inputs)?;
+    let inputs = files.iter().map(PathBuf::as_path).chain(args.flight.as_deref());
     for (k, output) in outputs.iter().enumerate() {
         let misuse =
             |what| Err(Error::new(ErrorKind::Misuse, output.display(), what).advice("choose another name"));
-        if inputs.iter().flatten().any(|input| same(input, output)) {
+        if inputs.clone().any(|input| same(input, output)) {
             return misuse("is an input, so it is not replaced");
         }
         if outputs[..k].iter().any(|other| same(other, output)) {
@@ -191,10 +193,11 @@ fn refuse_same_files(args: &RenderArgs, out: &Path) -> Result<()> {
 
 fn default_output(args: &RenderArgs) -> PathBuf {
     let ending = if args.flight.is_some() { "" } else { ".png" };
-    let out = beside(&args.input, ending);
+    let input = first(&args.input);
+    let out = beside(input, ending);
     // An input without an ending of its own is no folder for frames.
-    if out == args.input {
-        beside(&args.input, ".frames")
+    if out == input {
+        beside(input, ".frames")
     } else {
         out
     }
@@ -332,17 +335,17 @@ fn checksum(bytes: &[u8]) -> String {
     format!("crc32c:{:08x}", crc32c::crc32c(bytes))
 }
 
-/// The checksum of an input that is a file.
-fn file_checksum(path: &Path) -> Result<Option<String>> {
-    if path.to_str().is_some_and(|p| p.starts_with("synth:")) {
-        return Ok(None);
-    }
-    let mut file = fs::File::open(path).map_err(|e| Error::io(path.display(), e))?;
+/// The checksum over inputs that are files, one after another; none where there are none.
+fn files_checksum(files: &[PathBuf]) -> Result<Option<String>> {
     let (mut crc, mut buffer) = (0, vec![0; 1 << 20]);
-    loop {
-        match std::io::Read::read(&mut file, &mut buffer).map_err(|e| Error::io(path.display(), e))? {
-            0 => return Ok(Some(format!("crc32c:{crc:08x}"))),
-            n => crc = crc32c::crc32c_append(crc, &buffer[..n]),
+    for path in files {
+        let mut file = fs::File::open(path).map_err(|e| Error::io(path.display(), e))?;
+        loop {
+            match std::io::Read::read(&mut file, &mut buffer).map_err(|e| Error::io(path.display(), e))? {
+                0 => break,
+                n => crc = crc32c::crc32c_append(crc, &buffer[..n]),
+            }
         }
     }
+    Ok((!files.is_empty()).then(|| format!("crc32c:{crc:08x}")))
 }

@@ -33,7 +33,7 @@ mod usgs_dem;
 mod write;
 
 pub use georeference::{Georeference, Registration};
-pub use open::{open, open_bytes, open_file, open_with};
+pub use open::{files_of, name_of, open, open_bytes, open_file, open_with};
 pub use options::{Band, Crop, OpenOptions, RawLayout, SampleType};
 pub use read_at::{Cursor, ReadAt};
 pub use synth::{MAX_SYNTH_SIZE, Synth};

@@ -112,12 +112,39 @@ pub fn open_with(inputs: &[impl AsRef<Path>], options: &OpenOptions) -> Result<B
 }
 
 fn open_mosaic(inputs: &[impl AsRef<Path>], options: &OpenOptions) -> Result<Mosaic> {
+    let of_tile = OpenOptions {
+        crop: None,
+        spacing_m: None,
+        ..options.clone()
+    };
+    Mosaic::new(
+        &name_of(inputs),
+        &files_of(inputs)?,
+        &of_tile,
+        Box::new(open_path),
+    )
+}
+
+/// The name by which messages speak of all of `inputs`: the first one's, and how many more there are.
+pub fn name_of(inputs: &[impl AsRef<Path>]) -> String {
+    match inputs {
+        [] => String::new(),
+        [one] => one.as_ref().display().to_string(),
+        [first, more @ ..] => format!("{} and {} more", first.as_ref().display(), more.len()),
+    }
+}
+
+/// The files of `inputs`: of a folder the DEMs in it. Procedural terrain has none.
+///
+/// # Errors
+/// Where a folder cannot be read or holds no DEM; [`ErrorKind::Limit`] for more files than a mosaic may have.
+pub fn files_of(inputs: &[impl AsRef<Path>]) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for input in inputs {
         let path = input.as_ref();
         if path.is_dir() {
             files.extend(folder(path)?);
-        } else {
+        } else if path.to_str().and_then(Synth::parse).is_none() || inputs.len() > 1 {
             files.push(path.to_path_buf());
         }
         if files.len() > MAX_FILES {
@@ -125,17 +152,7 @@ fn open_mosaic(inputs: &[impl AsRef<Path>], options: &OpenOptions) -> Result<Mos
             return Err(Error::new(ErrorKind::Limit, path.display(), what));
         }
     }
-    let first = inputs[0].as_ref().display();
-    let name = match inputs.len() {
-        1 => first.to_string(),
-        n => format!("{first} and {} more", n - 1),
-    };
-    let of_tile = OpenOptions {
-        crop: None,
-        spacing_m: None,
-        ..options.clone()
-    };
-    Mosaic::new(&name, &files, &of_tile, Box::new(open_path))
+    Ok(files)
 }
 
 /// The DEMs of a folder, sorted by name: files whose ending promises one, packed or not.

@@ -131,6 +131,19 @@ impl OpenOptions {
         *self == Self::default()
     }
 
+    /// Refuses all options, for a terrain file called `name`: it has been read and cut when it was made.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`].
+    pub fn refuse_for_terrain(&self, name: &str) -> Result<()> {
+        if self.is_default() {
+            return Ok(());
+        }
+        let what = "is a terrain file, whose samples and place are fixed";
+        Err(Error::new(ErrorKind::Misuse, name, what)
+            .advice("give --nodata, --spacing, --band, --raw, --srcwin and --projwin when it is made"))
+    }
+
     /// Refuses what speaks of a file's samples, for an input that is none.
     ///
     /// # Errors

@@ -5,16 +5,18 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::InputArgs;
 use crate::cli::{values, view_values};
 use crate::clipmap::Wait;
 use crate::light::Sun;
 use crate::shade::ViewMode;
 
-/// Draw pictures of a DEM or terrain file: one that shows the whole, one from a given place, or a flight.
+/// Draw pictures of a DEM or terrain file: one that shows the whole, one from a given place, or a flight. Of a DEM the
+/// pyramid is built on the way, and no light traced.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct RenderArgs {
-    /// A terrain file, a DEM (its pyramid is built on the way, no light traced), or synth:SIZE[:SEED]
-    pub(in crate::cli) input: PathBuf,
+    #[command(flatten)]
+    pub(in crate::cli) input: InputArgs,
 
     /// The picture, or the folder of a flight's frames [default: STEM.png, or STEM for a flight]
     #[arg(long, short, value_name = "PATH")]

@@ -179,17 +179,27 @@ fn geographic(system: i64) -> bool {
 
 /// A whole number in free form, from byte `at` on.
 fn whole(head: &[u8], at: usize) -> Option<i64> {
+    Some(whole_and_end(head, at)?.0)
+}
+
+/// A whole number in free form, from byte `at` on, and where it ends.
+fn whole_and_end(head: &[u8], at: usize) -> Option<(i64, usize)> {
     let rest = head.get(at..)?;
     let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
     let text = &rest[start..rest.len().min(start + 12)];
     let signed = usize::from(matches!(text.first(), Some(b'-' | b'+')));
     let digits = text[signed..].iter().take_while(|b| b.is_ascii_digit()).count();
-    std::str::from_utf8(&text[..signed + digits]).ok()?.parse().ok()
+    let value = std::str::from_utf8(&text[..signed + digits]).ok()?.parse().ok()?;
+    Some((value, at + start + signed + digits))
 }
 
-/// Where the first profile begins: after 864 bytes in the old format, 1024 in the new, 893 in some files of neither.
+/// Where the first profile, whose row and column are both 1, begins: after 864 bytes in the old format, 1024 in the new
+/// (where some give column 0), 893 in some files of neither.
 fn data_start(head: &[u8]) -> Option<u64> {
-    let pair = |at: usize| Some((whole(head, at)?, whole(head, at + 6)?));
+    let pair = |at: usize| {
+        let (row, end) = whole_and_end(head, at)?;
+        Some((row, whole(head, end)?))
+    };
     [(864, 1), (1024, 1), (1024, 0), (893, 1)]
         .into_iter()
         .find(|(at, column)| pair(*at) == Some((1, *column)))
