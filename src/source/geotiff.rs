@@ -1,7 +1,7 @@
 //! GeoTIFF: one band of heights in strips or tiles, of any type of whole numbers or floats, read block by block.
 //!
 //! `geotiff/` holds a step of the way each: `ifd` the file's directories, `layout` where the blocks of an image lie,
-//! `codec` and `predictor` what they are packed with, `block` these together, `samples` and `nodata` how their bytes
+//! `codec`, `lerc` and `predictor` what they are packed with, `block` these together, `samples` and `nodata` how their bytes
 //! become heights, `raster` reading by rectangles with a `cache`; `place` and `keys` where the image lies, `metadata`
 //! scale, offset and unit of its heights.
 //!
@@ -16,6 +16,7 @@ mod codec;
 mod ifd;
 mod keys;
 mod layout;
+mod lerc;
 mod metadata;
 mod nodata;
 mod place;

@@ -3,12 +3,13 @@
 use super::codec::Compression;
 use super::ifd::{File, Order};
 use super::layout::Layout;
+use super::lerc;
 use super::predictor;
 use crate::error::{Error, ErrorKind, Result};
 use crate::source::held::{MAX_COMPRESSION, filled};
 
 /// A block may always take this much memory, however little of it is stored.
-const FREE_BYTES: u64 = 4 << 20;
+pub(super) const FREE_BYTES: u64 = 4 << 20;
 /// What a compressed block may need beyond twice the bytes of its samples.
 const SPARE_BYTES: u64 = 64 << 10;
 
@@ -29,9 +30,9 @@ pub(super) fn decode(file: &File, layout: &Layout, column: i64, row: i64) -> Res
 
 /// The order of the bytes of a decoded sample.
 pub(super) fn order(layout: &Layout) -> Order {
-    match (layout.predictor, is_packed(layout)) {
-        (3, _) => Order::Big,
-        (_, true) => Order::Little,
+    match layout.predictor {
+        3 => Order::Big,
+        _ if is_packed(layout) || matches!(layout.compression, Compression::Lerc(_)) => Order::Little,
         _ => layout.order,
     }
 }
@@ -107,7 +108,18 @@ fn unpacked(file: &File, layout: &Layout, index: usize, row: i64) -> Result<Opti
         Compression::None if stored.len() as u64 == wanted => stored,
         compression => {
             let mut raw = filled(&file.name, wanted as usize, 0u8)?;
-            let unpacked = compression.unpack(&stored, &mut raw);
+            let unpacked = match compression {
+                Compression::Lerc(around) => {
+                    let wanted = lerc::Wanted {
+                        kind: layout.kind,
+                        columns: layout.block_width as usize,
+                        rows: [rows, layout.stored_rows].map(|n| n as usize),
+                        interleaved: layout.interleaved,
+                    };
+                    lerc::unpack(around, wanted, &stored, &mut raw)
+                }
+                compression => compression.unpack(&stored, &mut raw),
+            };
             unpacked.map_err(|what| file.broken(format!("{} {what}", name())))?;
             raw
         }

@@ -1,14 +1,15 @@
 //! The compressions of TIFF, from the bytes of a block to those of its samples, through a library where there is one.
 //!
-//! LZW by weezl, deflate by flate2, zstd by ruzstd; PackBits (TIFF 6.0, section 9) is a loop. JPEG and WebP lose
-//! exactness; LERC and LZMA have no kept reader in Rust that needs no C.
+//! LZW by weezl, deflate by flate2, zstd by ruzstd; PackBits (TIFF 6.0, section 9) is a loop; LERC has a file of its own.
+//! JPEG and WebP lose exactness, LZMA is rare.
 
 use std::io::Read;
 
 use flate2::{Decompress, FlushDecompress, Status};
 use weezl::{BitOrder, LzwStatus};
 
-use super::ifd::File;
+use super::ifd::{self, Directory, File};
+use super::lerc::Around;
 use crate::error::Result;
 
 /// A compression that is read.
@@ -19,25 +20,36 @@ pub(super) enum Compression {
     Deflate,
     PackBits,
     Zstd,
+    Lerc(Around),
 }
 
 impl Compression {
-    /// The compression of that number.
+    /// The compression of that number, of an image of `directory`.
     ///
     /// # Errors
     /// [`crate::ErrorKind::Unsupported`] for all others, by name where it is known.
-    pub(super) fn of(file: &File, number: u64) -> Result<Self> {
+    pub(super) fn of(file: &File, directory: &Directory, number: u64) -> Result<Self> {
         let name = match number {
             1 => return Ok(Self::None),
             5 => return Ok(Self::Lzw),
             8 | 32946 => return Ok(Self::Deflate),
             32773 => return Ok(Self::PackBits),
             50000 => return Ok(Self::Zstd),
+            34887 => {
+                let parameters = file
+                    .whole(directory, ifd::LERC_PARAMETERS, 2)?
+                    .unwrap_or_default();
+                return match parameters.get(1) {
+                    None | Some(0) => Ok(Self::Lerc(Around::Nothing)),
+                    Some(1) => Ok(Self::Lerc(Around::Deflate)),
+                    Some(2) => Ok(Self::Lerc(Around::Zstd)),
+                    Some(n) => Err(file.unsupported(format!("has LERC data packed in the unknown way {n}"))),
+                };
+            }
             2..=4 => "fax",
             6 | 7 => "JPEG",
             34676 | 34677 => "SGI LogLuv",
             34712 => "JPEG 2000",
-            34887 => "LERC",
             34925 => "LZMA",
             50001 => "WebP",
             50002 => "JPEG XL",
@@ -69,6 +81,7 @@ impl Compression {
             Self::Deflate => deflate(stored, out),
             Self::PackBits => packbits(stored, out),
             Self::Zstd => zstd(stored, out),
+            Self::Lerc(_) => Err("has LERC data, which are unpacked by what is known of them".into()),
         }
     }
 }
@@ -139,25 +152,37 @@ fn packbits(stored: &[u8], out: &mut [u8]) -> Result<(), String> {
 }
 
 fn zstd(stored: &[u8], out: &mut [u8]) -> Result<(), String> {
-    let damaged = |error: &dyn std::fmt::Display| format!("has damaged zstd data: {error}");
+    let mut stream = zstd_reader(stored, out.len() as u64)?;
+    stream.read_exact(out).map_err(|e| damaged_zstd(&e))
+}
+
+fn damaged_zstd(error: &dyn std::fmt::Display) -> String {
+    format!("has damaged zstd data: {error}")
+}
+
+/// Unpacks a zstd frame of which the first `wanted` bytes at most will be read.
+///
+/// # Errors
+/// A phrase, where it is no frame, or one of far more bytes.
+pub(super) fn zstd_reader(stored: &[u8], wanted: u64) -> Result<impl Read, String> {
     let window = zstd_window(stored).ok_or("has no zstd data where they are expected")?;
     // The library takes memory for the window that the frame asks for, which is often far more than a block: no match
     // in what is wanted reaches back further than to its start.
-    let enough = (out.len() as u64).next_power_of_two().max(LEAST_WINDOW_BYTES);
-    let (head, rest) = stored.split_at(6);
+    let enough = wanted.next_power_of_two().max(LEAST_WINDOW_BYTES);
+    let (head, rest) = stored
+        .split_at_checked(6)
+        .ok_or("has no zstd data where they are expected")?;
     let mut head = head.to_vec();
     if window > enough {
         if head[4] & SINGLE_SEGMENT != 0 {
             return Err(format!(
-                "has zstd data of {window} bytes for {} bytes of samples",
-                out.len()
+                "has zstd data of {window} bytes for {wanted} bytes of samples"
             ));
         }
         head[5] = ((enough.trailing_zeros() - 10) << 3) as u8;
     }
-    let mut stream =
-        ruzstd::decoding::StreamingDecoder::new((&head[..]).chain(rest)).map_err(|e| damaged(&e))?;
-    stream.read_exact(out).map_err(|e| damaged(&e))
+    let whole = std::io::Cursor::new(head).chain(rest);
+    ruzstd::decoding::StreamingDecoder::new(whole).map_err(|e| damaged_zstd(&e))
 }
 
 /// The least window that is asked for: a block of zstd holds no more.

@@ -41,6 +41,7 @@ pub(super) const GEO_DOUBLES: u16 = 34736;
 pub(super) const GEO_TEXTS: u16 = 34737;
 pub(super) const GDAL_METADATA: u16 = 42112;
 pub(super) const GDAL_NODATA: u16 = 42113;
+pub(super) const LERC_PARAMETERS: u16 = 50674;
 
 /// The order of the bytes of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -109,7 +109,7 @@ impl Layout {
             )));
         }
         let (kind, bits) = sample_type(file, directory, bands)?;
-        let compression = Compression::of(file, scalar(ifd::COMPRESSION, Some(1))?)?;
+        let compression = Compression::of(file, directory, scalar(ifd::COMPRESSION, Some(1))?)?;
         check_colours(file, scalar(ifd::PHOTOMETRIC, Some(1))?)?;
         let predictor = match compression.is_predicted() {
             true => scalar(ifd::PREDICTOR, Some(1))?,
