@@ -104,6 +104,11 @@ impl Error {
         self.kind
     }
 
+    /// What was found there, without subject and advice.
+    pub fn what(&self) -> &str {
+        &self.what
+    }
+
     /// What the error is about.
     pub fn subject(&self) -> &str {
         &self.subject

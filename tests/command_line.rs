@@ -128,7 +128,7 @@ fn inputs_that_are_none_get_one_line_and_leave_nothing() {
         fails(here, 1, &[command, "text.tif"], &["text.tif: "]);
         fails(here, 1, &[command, "empty.tif"], &["empty.tif: "]);
         fails(here, 1, &[command, "synth:0"], &["synth:0"]);
-        fails(here, 1, &[command, "."], &["folder"]);
+        fails(here, 1, &[command, "."], &["./empty.tif: is empty"]);
     }
     assert_eq!(names(here), ["empty.tif", "text.tif"]);
 }
@@ -242,8 +242,8 @@ fn info_says_what_a_terrain_file_is_and_verify_finds_what_is_damaged() {
         json.find(&format!("\"{name}\":"))
             .unwrap_or_else(|| panic!("no {name} in {json}"))
     };
-    let documented = "format type width height spacing min max voids crs origin extent registration levels light \
-        assumed";
+    let documented = "format type width height spacing min max voids vertical_unit vertical_datum crs unit pixel origin \
+        extent registration levels light assumed noticed";
     let places: Vec<usize> = documented.split_whitespace().map(at).collect();
     assert!(places.is_sorted(), "{json}");
     assert_eq!(info.as_object().unwrap().len(), places.len(), "{json}");

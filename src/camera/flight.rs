@@ -28,7 +28,7 @@ use super::Camera;
 use crate::error::{Error, ErrorKind, Result};
 
 /// Frames a second where a flight does not say.
-const DEFAULT_FPS: f64 = 30.0;
+pub(super) const DEFAULT_FPS: f64 = 30.0;
 
 /// Degrees of vertical field of view where a key does not say.
 const DEFAULT_FOV_DEG: f64 = 60.0;
@@ -62,7 +62,7 @@ pub struct Key {
     pub fov_deg: f64,
 }
 
-fn default_fov_deg() -> f64 {
+pub(super) fn default_fov_deg() -> f64 {
     DEFAULT_FOV_DEG
 }
 
@@ -130,6 +130,15 @@ struct OnlyFrame {
     frame: Option<String>,
 }
 
+/// Whether the keys of a flight's text are in the DEM's own reference system. They have other members than those in
+/// world metres, which would be refused as unknown.
+pub fn is_crs(json: &str) -> bool {
+    let frame = serde_json::from_str(json)
+        .ok()
+        .and_then(|OnlyFrame { frame }| frame);
+    frame.as_deref() == Some("crs")
+}
+
 impl Flight {
     /// A flight through `keys` at `fps` frames a second.
     ///
@@ -141,7 +150,7 @@ impl Flight {
     }
 
     /// The flight, or what is wrong with it as an error of kind `bad` about `name`.
-    fn checked(name: &str, bad: ErrorKind, fps: f64, keys: Vec<Key>) -> Result<Self> {
+    pub(super) fn checked(name: &str, bad: ErrorKind, fps: f64, keys: Vec<Key>) -> Result<Self> {
         let refuse = |what: String| Error::new(bad, name, what);
         if !(fps.is_finite() && fps > 0.0) {
             return Err(refuse(format!("fps of {fps} is not above 0 and finite")));
@@ -201,19 +210,14 @@ impl Flight {
     /// Reads a flight from JSON; `name` is what errors call it.
     ///
     /// # Errors
-    /// [`ErrorKind::Broken`] where the text is not a flight, [`ErrorKind::Unsupported`] where its keys are in
-    /// the DEM's own CRS, [`ErrorKind::Limit`] where it has more than ten million frames.
+    /// [`ErrorKind::Broken`] where the text is not a flight, [`ErrorKind::Misuse`] where its keys are in the DEM's own
+    /// CRS ([`CrsFlight`](super::CrsFlight) reads those), [`ErrorKind::Limit`] where it has more than ten million frames.
     pub fn parse(name: &str, json: &str) -> Result<Self> {
-        // Asked for first: keys of a CRS flight have other members, which would be refused as unknown.
-        if let Ok(OnlyFrame { frame: Some(frame) }) = serde_json::from_str(json)
-            && frame == "crs"
-        {
-            return Err(Error::new(
-                ErrorKind::Unsupported,
-                name,
-                "flights in the frame \"crs\" are not read",
-            )
-            .advice("give each key an \"eye\" in world metres"));
+        if is_crs(json) {
+            let what = "is in the frame \"crs\", which only a DEM that lies somewhere can place";
+            return Err(
+                Error::new(ErrorKind::Misuse, name, what).advice("give each key an \"eye\" in world metres")
+            );
         }
         let written: Written = serde_json::from_str(json).map_err(|e| {
             Error::new(ErrorKind::Broken, name, format!("is not a flight: {e}"))

@@ -4,13 +4,15 @@
 //! -z), pitch turns up, roll tilts the camera's right side down. Depth is reversed and has no far end, near / distance
 //! along the view axis, unless a [`View`] says otherwise.
 
+mod crs_flight;
 mod depth;
 mod flight;
 mod view;
 mod whole;
 
+pub use crs_flight::{CrsFlight, CrsPlace};
 pub use depth::{Depth, DepthDirection};
-pub use flight::{Flight, Key};
+pub use flight::{Flight, Key, is_crs};
 pub use view::{MAX_PICTURE_PX, View, check_picture};
 pub use whole::overview;
 

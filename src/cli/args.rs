@@ -1,5 +1,6 @@
 //! What may be typed: commands, their options, and the help of each.
 
+mod input;
 #[cfg(feature = "gpu")]
 mod measure;
 #[cfg(feature = "gpu")]
@@ -9,11 +10,14 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+pub(super) use self::input::InputArgs;
 #[cfg(feature = "gpu")]
 pub(super) use self::measure::MeasureArgs;
 #[cfg(feature = "gpu")]
 pub(super) use self::render::{RenderArgs, ViewArgs};
 use super::values;
+#[cfg(feature = "dem")]
+use crate::build::PartKind;
 use crate::light::{DEFAULT_SKY_DIRECTIONS, Sun};
 use crate::pyramid::FilterKind;
 
@@ -40,14 +44,16 @@ pub(super) enum Command {
     #[cfg(feature = "gpu")]
     Measure(Box<MeasureArgs>),
     #[cfg(feature = "dem")]
+    Export(ExportArgs),
+    #[cfg(feature = "dem")]
     Synth(SynthArgs),
 }
 
 /// Say what a DEM or terrain file is, and what was assumed of it.
 #[derive(Debug, Args)]
 pub(super) struct InfoArgs {
-    /// A DEM, a terrain file, or synth:SIZE[:SEED]
-    pub(super) input: PathBuf,
+    #[command(flatten)]
+    pub(super) input: InputArgs,
 
     /// Print one JSON object
     #[arg(long)]
@@ -65,8 +71,8 @@ pub(super) struct InfoArgs {
 /// Make a terrain file of a DEM: all its levels, their bounds, and light.
 #[derive(Debug, Args)]
 pub(super) struct PreprocessArgs {
-    /// A DEM, or synth:SIZE[:SEED]
-    pub(super) input: PathBuf,
+    #[command(flatten)]
+    pub(super) input: InputArgs,
 
     /// The terrain file [default: STEM.terrain.exr beside the input]
     #[arg(long, short, value_name = "FILE")]
@@ -97,6 +103,36 @@ pub(super) struct PreprocessArgs {
     /// Write how long it took, and what it cost, as a line of JSON
     #[arg(long, value_name = "FILE")]
     pub(super) stats: Option<PathBuf>,
+
+    /// Replace what exists
+    #[arg(long, short)]
+    pub(super) force: bool,
+
+    /// Show no progress and no warnings
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+}
+
+/// Write a level's heights, light or error as a GeoTIFF that lies over the DEM. Of a DEM the pyramid is built on the
+/// way where a level needs it.
+#[cfg(feature = "dem")]
+#[derive(Debug, Args)]
+pub(super) struct ExportArgs {
+    #[command(flatten)]
+    pub(super) input: InputArgs,
+
+    /// What is written: height in metres, sun or sky (shares of 0 to 1), or error (metres by which the level's surface
+    /// lies above the DEM's own, at each of the DEM's samples)
+    #[arg(long, value_name = "PART", value_parser = values::part)]
+    pub(super) part: PartKind,
+
+    /// The level: 0 is the DEM itself, each further one has half as many samples a side [default: 0; 1 for error]
+    #[arg(long, value_name = "L")]
+    pub(super) level: Option<u32>,
+
+    /// The GeoTIFF
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: PathBuf,
 
     /// Replace what exists
     #[arg(long, short)]

@@ -6,12 +6,13 @@ use serde::Serialize;
 
 use super::args::InfoArgs;
 use super::input::{self, Input};
+use super::suspects::Suspects;
 use super::{Failure, Outcome, print, say};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Rect, Size};
 use crate::levels::{Bounds, Levels};
 use crate::progress::Progress;
-use crate::source::{Description, Georeference, HeightSource, Registration};
+use crate::source::{self, Description, Georeference, HeightSource, Registration};
 use crate::terrain::{LightMeta, TerrainFile};
 
 /// A DEM of at most this many samples is read to say its least and greatest height and its voids.
@@ -40,8 +41,16 @@ struct Info {
     max: Option<f64>,
     /// Samples without data; null where that is not cheap to know.
     voids: Option<u64>,
+    /// The unit of heights as the file has them; `min` and `max` are metres. Null where it is not known.
+    vertical_unit: Option<String>,
+    /// What heights are measured from; null where that is not known.
+    vertical_datum: Option<String>,
     /// The reference system; null where it is not known, as all that follow about the place.
     crs: Option<String>,
+    /// The unit of its coordinates.
+    unit: Option<String>,
+    /// CRS units from column to column and from row to row.
+    pixel: Option<[f64; 2]>,
     /// CRS coordinates of sample (0, 0).
     origin: Option<[f64; 2]>,
     /// CRS coordinates of the least and greatest easting and northing of any sample: west, south, east, north.
@@ -54,6 +63,8 @@ struct Info {
     light: Option<Light>,
     /// What was assumed because the file does not say, as sentences.
     assumed: Vec<String>,
+    /// What a look at the samples showed that a user should know, as sentences.
+    noticed: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -64,11 +75,12 @@ struct Light {
     sky_directions: u32,
 }
 
-/// Least and greatest height, less the grid's base, and voids.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Least and greatest height, less the grid's base, voids, and what looks like voids that nobody declared.
+#[derive(Clone, Debug, Default, PartialEq)]
 struct Heights {
     range: Option<[f32; 2]>,
     voids: Option<u64>,
+    suspects: Suspects,
 }
 
 /// Runs the command.
@@ -90,7 +102,7 @@ pub(super) fn run(args: &InfoArgs, progress: &dyn Progress) -> Outcome {
         let json = serde_json::to_string(&info).expect("finite numbers and text are valid JSON");
         return print(&(json + "\n"));
     }
-    print(&text(&args.input.display().to_string(), &info, args.verify))
+    print(&text(&source::name_of(&args.input.inputs), &info, args.verify))
 }
 
 fn of_dem(source: &dyn HeightSource, all: bool, progress: &dyn Progress) -> Result<Info> {
@@ -101,28 +113,35 @@ fn of_dem(source: &dyn HeightSource, all: bool, progress: &dyn Progress) -> Resu
         place,
         assumed,
         name,
+        vertical_unit,
         ..
     } = source.description();
+    let suspects = Suspects::new(source.description());
     let heights = if all || grid.size.samples() <= CHEAP_SAMPLES {
-        read_heights(name, grid, progress, |rect, out| source.read(rect, out))?
+        read_heights(name, grid, suspects, progress, |rect, out| source.read(rect, out))?
     } else {
         Heights::default()
     };
-    Ok(Info::new(
+    let mut noticed = source.remarks(progress)?;
+    noticed.extend(heights.suspects.sentences());
+    let mut info = Info::new(
         grid,
         format,
         sample_type,
         place.as_ref(),
+        vertical_unit,
         heights,
         None,
         assumed,
-    ))
+    );
+    info.noticed = noticed;
+    Ok(info)
 }
 
 fn of_terrain(file: &TerrainFile, all: bool, progress: &dyn Progress) -> Result<Info> {
     let (grid, meta) = (file.grid(), file.meta());
     let heights = if all || grid.size.samples() <= CHEAP_SAMPLES {
-        read_heights(file.name(), grid, progress, |rect, out| {
+        read_heights(file.name(), grid, Suspects::default(), progress, |rect, out| {
             // A file that is open has all its data, or answers with an error.
             file.heights(0, rect, out).map(drop)
         })?
@@ -134,6 +153,7 @@ fn of_terrain(file: &TerrainFile, all: bool, progress: &dyn Progress) -> Result<
         "terrain file",
         "float32",
         meta.place.as_ref(),
+        &meta.vertical_unit,
         heights,
         meta.light,
         &meta.assumed,
@@ -144,6 +164,7 @@ fn of_terrain(file: &TerrainFile, all: bool, progress: &dyn Progress) -> Result<
 fn read_heights(
     name: &str,
     grid: &Grid,
+    mut suspects: Suspects,
     progress: &dyn Progress,
     read: impl Fn(Rect, &mut [f32]) -> Result<()>,
 ) -> Result<Heights> {
@@ -164,6 +185,7 @@ fn read_heights(
                 voids += 1;
             } else {
                 widen(&mut range, h, h);
+                suspects.look_at(h);
             }
         }
         progress.advance(rect.height() as u64);
@@ -171,6 +193,7 @@ fn read_heights(
     Ok(Heights {
         range,
         voids: Some(voids),
+        suspects,
     })
 }
 
@@ -187,7 +210,10 @@ fn bounded_heights(file: &TerrainFile) -> Result<Heights> {
             .filter(|bounds| !bounds.is_void())
             .for_each(|p| widen(&mut range, p.min, p.max));
     }
-    Ok(Heights { range, voids: None })
+    Ok(Heights {
+        range,
+        ..Heights::default()
+    })
 }
 
 fn widen(range: &mut Option<[f32; 2]>, min: f32, max: f32) {
@@ -201,6 +227,7 @@ impl Info {
         format: &str,
         sample_type: &str,
         place: Option<&Georeference>,
+        vertical_unit: &str,
         heights: Heights,
         light: Option<LightMeta>,
         assumed: &[String],
@@ -216,6 +243,10 @@ impl Info {
             min: heights.range.map(|[min, _]| absolute(min)),
             max: heights.range.map(|[_, max]| absolute(max)),
             voids: heights.voids,
+            vertical_unit: (!matches!(vertical_unit, "unknown" | "")).then(|| vertical_unit.into()),
+            vertical_datum: place.and_then(|p| p.epsg()[1]).map(|code| format!("EPSG:{code}")),
+            unit: place.map(|p| p.unit(grid.spacing_m[0])),
+            pixel: place.map(|p| p.pixel),
             crs: place.and_then(|p| p.crs.clone()),
             origin: place.map(|p| p.origin),
             extent: place.map(|p| {
@@ -230,6 +261,7 @@ impl Info {
                 sky_directions: l.sky_directions,
             }),
             assumed: assumed.to_vec(),
+            noticed: Vec::new(),
         }
     }
 }
@@ -259,6 +291,9 @@ fn text(name: &str, info: &Info, verified: bool) -> String {
             format!("{voids} of {} samples", info.width * info.height),
         );
     }
+    let [unit, datum] =
+        [&info.vertical_unit, &info.vertical_datum].map(|known| known.as_deref().unwrap_or("unknown"));
+    line("vertical", format!("unit {unit}, datum {datum}"));
     match (info.extent, info.origin) {
         (Some([west, south, east, north]), Some([x, y])) => {
             let crs = info.crs.as_deref().unwrap_or("unknown reference system");
@@ -278,6 +313,9 @@ fn text(name: &str, info: &Info, verified: bool) -> String {
                 _ => "pixels are points",
             };
             line("", format!("first sample at {}, {}; {how}", short(x), short(y)));
+            if let (Some([dx, dy]), Some(unit)) = (info.pixel, &info.unit) {
+                line("", format!("pixel {} x {}, unit {unit}", short(dx), short(dy)));
+            }
         }
         _ => line("place", "unknown".into()),
     }
@@ -295,6 +333,9 @@ fn text(name: &str, info: &Info, verified: bool) -> String {
     }
     for sentence in &info.assumed {
         line("assumed", sentence.clone());
+    }
+    for sentence in &info.noticed {
+        line("noticed", sentence.clone());
     }
     if verified {
         line("verified", "all of it was read, and is whole".into());
@@ -349,7 +390,7 @@ mod tests {
             base_m: 1000.0,
             ..Grid::new(1500, 1500, [1.0, 1.0])
         };
-        let heights = read_heights("t", &grid, &Silent, |rect, out| {
+        let heights = read_heights("t", &grid, Suspects::default(), &Silent, |rect, out| {
             for ((x, z), h) in rect.cells().zip(out) {
                 *h = match (x, z) {
                     (3, 1499) => -7.0,
@@ -365,21 +406,31 @@ mod tests {
             heights,
             Heights {
                 range: Some([-7.0, 9.0]),
-                voids: Some(1500)
+                voids: Some(1500),
+                suspects: Suspects::default(),
             }
         );
-        let info = Info::new(&grid, "test", "float32", None, heights, None, &[]);
+        let info = Info::new(&grid, "test", "float32", None, "unknown", heights, None, &[]);
         assert_eq!((info.min, info.max), (Some(993.0), Some(1009.0)));
     }
 
     #[test]
     fn all_void_is_said_as_such() {
         let grid = Grid::new(3, 2, [1.0, 1.0]);
-        let heights = read_heights("t", &grid, &Silent, |_, out| {
+        let heights = read_heights("t", &grid, Suspects::default(), &Silent, |_, out| {
             out.fill(f32::NAN);
             Ok(())
         });
-        let info = Info::new(&grid, "test", "float32", None, heights.unwrap(), None, &[]);
+        let info = Info::new(
+            &grid,
+            "test",
+            "float32",
+            None,
+            "unknown",
+            heights.unwrap(),
+            None,
+            &[],
+        );
         assert_eq!((info.min, info.voids), (None, Some(6)));
         assert!(text("t", &info, false).contains("all samples are void"));
     }

@@ -3,7 +3,7 @@
 use super::Outcome;
 use super::args::MeasureArgs;
 use super::progress::Terminal;
-use super::render::{checksum, command_line, file_checksum, read_flight};
+use super::render::{checksum, command_line, files_checksum, read_flight};
 use crate::build::DEFAULT_MEMORY_BYTES;
 use crate::camera::{Flight, check_picture};
 use crate::clipmap::ClipmapOptions;
@@ -13,6 +13,7 @@ use crate::measure::{Effort, FILES, Folder, MeasureOptions, SettingLists, measur
 use crate::progress::Progress;
 use crate::render::HeadlessOptions;
 use crate::shade::ViewMode;
+use crate::source;
 use crate::stats::Run;
 use crate::stream::Terrain;
 
@@ -35,7 +36,7 @@ pub(super) fn run(args: &MeasureArgs, terminal: &Terminal) -> Outcome {
     let folder = Folder::create(&args.output, &FILES, args.force)?;
     let gpu = gpu::open()?;
 
-    let terrain = Terrain::open(&args.input, terminal)?;
+    let terrain = Terrain::open_with(&args.input.inputs, &args.input.read.options(), terminal)?;
     let options = MeasureOptions {
         lists,
         effort: effort(args),
@@ -56,7 +57,7 @@ pub(super) fn run(args: &MeasureArgs, terminal: &Terminal) -> Outcome {
         driver: gpu.driver(),
         command: command_line(),
         flight_checksum: Some(checksum(json.as_bytes())),
-        input_checksum: file_checksum(&args.input)?,
+        input_checksum: files_checksum(&source::files_of(&args.input.inputs)?)?,
         ..Run::default()
     };
     let contents = measure(&gpu, &terrain, &flight, &options, &run, terminal)?;

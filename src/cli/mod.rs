@@ -2,6 +2,8 @@
 //! error, an error as one line: `clipscape: SUBJECT: what is wrong; what to do`.
 
 mod args;
+#[cfg(feature = "dem")]
+mod export;
 mod info;
 mod input;
 #[cfg(feature = "gpu")]
@@ -10,6 +12,7 @@ mod preprocess;
 mod progress;
 #[cfg(feature = "gpu")]
 mod render;
+mod suspects;
 #[cfg(feature = "dem")]
 mod synth;
 mod values;
@@ -53,6 +56,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Render(args) => render::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "gpu")]
         Command::Measure(args) => measure::run(&args, &Terminal::new(args.quiet)),
+        #[cfg(feature = "dem")]
+        Command::Export(args) => export::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "dem")]
         Command::Synth(args) => synth::run(&args, &Terminal::new(args.quiet)),
     })
@@ -165,7 +170,7 @@ mod tests {
             ),
             (
                 "clipscape info",
-                "the following required arguments were not provided: <INPUT>; see --help",
+                "the following required arguments were not provided: <INPUT>...; see --help",
             ),
             (
                 "clipscape preprocess a.tif --sun 0,99",

@@ -9,6 +9,7 @@ use super::progress::Terminal;
 use crate::build::{self, Output, PreprocessOptions};
 use crate::error::{Error, ErrorKind};
 use crate::light::LightOptions;
+use crate::progress::Progress;
 
 /// Runs the command.
 pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
@@ -23,7 +24,8 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
     let out = args
         .output
         .clone()
-        .unwrap_or_else(|| input::beside(&args.input, ".terrain.exr"));
+        .unwrap_or_else(|| input::beside(input::first(&args.input), ".terrain.exr"));
+    input::refuse_own(&args.input, &out)?;
     let defaults = PreprocessOptions::default();
     let options = PreprocessOptions {
         light: (!args.no_light).then(|| LightOptions {
@@ -33,7 +35,7 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
         filter: args.filter.into(),
         force: args.force,
         memory_bytes: args.memory.unwrap_or(defaults.memory_bytes),
-        source: input::stamp(&args.input),
+        source: input::stamp(&args.input.inputs),
         ..defaults
     };
     // Made first: where it cannot be, that is said before the work and not after it.
@@ -42,6 +44,9 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
         .as_deref()
         .map(|path| Output::create(path, args.force))
         .transpose()?;
+    for remark in source.remarks(terminal)? {
+        terminal.warn(&format!("{}: {remark}", source.description().name));
+    }
     let report = build::preprocess(source.as_ref(), &out, &options, terminal)?;
     if let (Some((output, mut file)), Some(path)) = (stats, &args.stats) {
         let line = serde_json::to_string(&report).expect("numbers are valid JSON") + "\n";

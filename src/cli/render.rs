@@ -4,25 +4,32 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+
 use super::Outcome;
 use super::args::{RenderArgs, ViewArgs};
-use super::input::beside;
+use super::input::{beside, first};
 use super::progress::Terminal;
 use super::view_values::ClipSize;
 use crate::build::{Output, refuse_existing};
-use crate::camera::{Camera, Flight, View, check_picture, overview};
+use crate::camera::{Camera, CrsFlight, Flight, View, check_picture, is_crs, overview};
 use crate::clipmap::{ClipmapOptions, fit_clip_size, height_range_m};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu;
 use crate::grid::Grid;
 use crate::levels::Levels;
 use crate::progress::Progress;
+use crate::query::Places;
 use crate::render::{Headless, HeadlessOptions, Recording, picture};
+use crate::source;
 use crate::stats::{FrameStats, PooledErrors, Run, SummaryStats};
 use crate::stream::Terrain;
 
 /// Vertical field of view where none is given, degrees.
 const FOV_DEG: f64 = 60.0;
+
+/// Metres above the ground where none are given: about a person's eyes.
+const ABOVE_M: f64 = 2.0;
 
 /// Clip size where none is given and the camera is among the terrain.
 const CLIP_SIZE: i64 = 256;
@@ -37,7 +44,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     check_picture(args.view.size)?;
     let flight = flight_json
         .as_ref()
-        .map(|(name, json)| Flight::parse(name, json))
+        .map(|(name, json)| Planned::parse(name, json))
         .transpose()?;
     let recording = Recording {
         folder: out.clone(),
@@ -48,7 +55,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     };
     match (&flight, args.flight.is_some()) {
         (Some(flight), _) => {
-            recording.check(flight)?;
+            recording.check(flight.times())?;
         }
         (None, true) => {
             // An orbit has the same frames around any DEM.
@@ -66,16 +73,18 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         .transpose()?;
     let gpu = gpu::open()?;
 
-    let terrain = Terrain::open(&args.input, terminal)?;
+    let terrain = Terrain::open_with(&args.input.inputs, &args.input.read.options(), terminal)?;
     warn_of_sun(args, &terrain, terminal);
+    let flight = flight.map(|flight| flight.over(&terrain)).transpose()?;
+    let camera = camera(args, &terrain)?;
     let scale = args.view.vertical_scale;
     let heights = height_range_m(&terrain)?.map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
     let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
     let aspect = f64::from(args.view.size[0]) / f64::from(args.view.size[1]);
-    let shots = match (flight, args.flight.is_some(), args.eye) {
+    let shots = match (flight, args.flight.is_some(), camera) {
         (Some(flight), ..) => Shots::Flight(flight),
         (None, true, _) => Shots::Flight(Flight::orbit(terrain.grid(), low, high).scaled_down(scale)?),
-        (None, false, Some(eye)) => Shots::Still(camera(args, eye)),
+        (None, false, Some(camera)) => Shots::Still(camera),
         (None, false, None) => Shots::Still(overview(terrain.grid(), low, high, aspect).scaled_down(scale)),
     };
     if args.view.clip_size == Some(ClipSize::Auto) {
@@ -111,7 +120,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
             driver: headless.gpu().driver(),
             command: command_line(),
             flight_checksum: flight_json.as_ref().map(|(_, json)| checksum(json.as_bytes())),
-            input_checksum: file_checksum(&args.input)?,
+            input_checksum: files_checksum(&source::files_of(&args.input.inputs)?)?,
             faults: faults.len() as u64,
             errors: pooled_errors(&headless, &frames),
         };
@@ -216,11 +225,12 @@ fn refuse_same_files(args: &RenderArgs, out: &Path) -> Result<()> {
         .chain([args.animation.as_deref(), args.contact_sheet.as_deref()])
         .flatten()
         .collect();
-    let inputs = [Some(args.input.as_path()), args.flight.as_deref()];
+    let files = source::files_of(&args.input.inputs)?;
+    let inputs = files.iter().map(PathBuf::as_path).chain(args.flight.as_deref());
     for (k, output) in outputs.iter().enumerate() {
         let misuse =
             |what| Err(Error::new(ErrorKind::Misuse, output.display(), what).advice("choose another name"));
-        if inputs.iter().flatten().any(|input| same(input, output)) {
+        if inputs.clone().any(|input| same(input, output)) {
             return misuse("is an input, so it is not replaced");
         }
         if outputs[..k].iter().any(|other| same(other, output)) {
@@ -232,10 +242,11 @@ fn refuse_same_files(args: &RenderArgs, out: &Path) -> Result<()> {
 
 fn default_output(args: &RenderArgs) -> PathBuf {
     let ending = if args.flight.is_some() { "" } else { ".png" };
-    let out = beside(&args.input, ending);
+    let input = first(&args.input);
+    let out = beside(input, ending);
     // An input without an ending of its own is no folder for frames.
-    if out == args.input {
-        beside(&args.input, ".frames")
+    if out == input {
+        beside(input, ".frames")
     } else {
         out
     }
@@ -251,14 +262,61 @@ pub(super) fn read_flight(path: &Path) -> Result<(String, String)> {
     Ok((name, json))
 }
 
-fn camera(args: &RenderArgs, eye: [f64; 3]) -> Camera {
-    Camera {
-        eye: eye.into(),
-        heading_deg: args.heading.unwrap_or(0.0),
-        pitch_deg: args.pitch.unwrap_or(0.0),
+/// A flight before the terrain is open.
+enum Planned {
+    World(Flight),
+    Crs(CrsFlight),
+}
+
+impl Planned {
+    fn parse(name: &str, json: &str) -> Result<Self> {
+        if is_crs(json) {
+            CrsFlight::parse(name, json).map(Self::Crs)
+        } else {
+            Flight::parse(name, json).map(Self::World)
+        }
+    }
+
+    /// Its times; places in a reference system are not known yet.
+    fn times(&self) -> &Flight {
+        match self {
+            Self::World(flight) => flight,
+            Self::Crs(flight) => flight.times(),
+        }
+    }
+
+    fn over(self, terrain: &Terrain) -> Result<Flight> {
+        match self {
+            Self::World(flight) => Ok(flight),
+            Self::Crs(flight) => {
+                let places = Places::new(terrain, terrain.place(), terrain.name())?;
+                flight.resolve(|key| places.above(key.at, key.above_m).map(|eye| eye.to_array()))
+            }
+        }
+    }
+}
+
+/// The camera that is asked for, if one is.
+fn camera(args: &RenderArgs, terrain: &Terrain) -> Result<Option<Camera>> {
+    let places = || Places::new(terrain, terrain.place(), terrain.name());
+    let eye: DVec3 = match (args.eye, args.eye_at) {
+        (Some(eye), _) => eye.into(),
+        (None, Some(at)) => places()?.above(at, args.above.unwrap_or(ABOVE_M))?,
+        (None, None) => return Ok(None),
+    };
+    let (mut heading_deg, mut pitch_deg) = (args.heading.unwrap_or(0.0), args.pitch.unwrap_or(0.0));
+    if let Some(at) = args.look_at {
+        // As drawn: directions are those of the scaled world.
+        let drawn = DVec3::new(1.0, args.view.vertical_scale, 1.0);
+        (heading_deg, pitch_deg) = Camera::toward(eye * drawn, places()?.ground(at)? * drawn);
+    }
+    Ok(Some(Camera {
+        eye,
+        heading_deg,
+        pitch_deg,
         roll_deg: args.roll.unwrap_or(0.0),
         fov_deg: args.fov.unwrap_or(FOV_DEG),
-    }
+    }))
 }
 
 /// The clip size asked for, or one that suits the picture.
@@ -267,7 +325,9 @@ fn camera(args: &RenderArgs, eye: [f64; 3]) -> Camera {
 /// and the camera a distance D away, steps of `1.25 D / R` remain. They are to be about two pixels of the picture,
 /// `2 D tan(fov/2) / height` each, at the overview's 45 degrees: N = 1.5 times the picture's height.
 fn clip_size(args: &RenderArgs) -> i64 {
-    let whole = args.eye.is_none() && args.flight.as_deref().is_none_or(|f| f == Path::new("orbit"));
+    let whole = args.eye.is_none()
+        && args.eye_at.is_none()
+        && args.flight.as_deref().is_none_or(|f| f == Path::new("orbit"));
     match args.view.clip_size {
         Some(ClipSize::Fixed(asked)) => asked,
         // Found once the terrain is known; until then a size whose transition may be as wide as any.
@@ -356,17 +416,17 @@ pub(super) fn checksum(bytes: &[u8]) -> String {
     format!("crc32c:{:08x}", crc32c::crc32c(bytes))
 }
 
-/// The checksum of an input that is a file.
-pub(super) fn file_checksum(path: &Path) -> Result<Option<String>> {
-    if path.to_str().is_some_and(|p| p.starts_with("synth:")) {
-        return Ok(None);
-    }
-    let mut file = fs::File::open(path).map_err(|e| Error::io(path.display(), e))?;
+/// The checksum over inputs that are files, one after another; none where there are none.
+pub(super) fn files_checksum(files: &[PathBuf]) -> Result<Option<String>> {
     let (mut crc, mut buffer) = (0, vec![0; 1 << 20]);
-    loop {
-        match std::io::Read::read(&mut file, &mut buffer).map_err(|e| Error::io(path.display(), e))? {
-            0 => return Ok(Some(format!("crc32c:{crc:08x}"))),
-            n => crc = crc32c::crc32c_append(crc, &buffer[..n]),
+    for path in files {
+        let mut file = fs::File::open(path).map_err(|e| Error::io(path.display(), e))?;
+        loop {
+            match std::io::Read::read(&mut file, &mut buffer).map_err(|e| Error::io(path.display(), e))? {
+                0 => break,
+                n => crc = crc32c::crc32c_append(crc, &buffer[..n]),
+            }
         }
     }
+    Ok((!files.is_empty()).then(|| format!("crc32c:{crc:08x}")))
 }

@@ -26,7 +26,7 @@ pub(super) fn run(args: &SynthArgs, terminal: &Terminal) -> Outcome {
 }
 
 /// A file that is called like another format would not be one.
-fn refuse_other_formats(path: &Path) -> Result<()> {
+pub(super) fn refuse_other_formats(path: &Path) -> Result<()> {
     let ending = path.extension().map(|e| e.to_ascii_lowercase());
     if ending.is_some_and(|e| e == "tif" || e == "tiff") {
         return Ok(());

@@ -2,8 +2,12 @@
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
+#[cfg(feature = "dem")]
+use crate::build::PartKind;
+use crate::grid::Rect;
 use crate::light::Sun;
 use crate::pyramid::FilterKind;
+use crate::source::{Band, RawLayout, SampleType};
 
 /// A finite number.
 pub(super) fn number(text: &str) -> Result<f64, String> {
@@ -11,6 +15,73 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
         Ok(value) if value.is_finite() => Ok(value),
         Ok(_) => Err("not a finite number".into()),
         Err(_) => Err("not a number".into()),
+    }
+}
+
+/// A number, also `nan`, `inf` and `-inf`.
+pub(super) fn any_number(text: &str) -> Result<f64, String> {
+    text.trim().parse().map_err(|_| "not a number".into())
+}
+
+/// A spacing `DX` or `DX,DZ` in metres, above 0.
+pub(super) fn spacing(text: &str) -> Result<[f64; 2], String> {
+    let [dx, dz] = if text.contains(',') {
+        numbers(text)?
+    } else {
+        [number(text)?; 2]
+    };
+    if dx > 0.0 && dz > 0.0 {
+        Ok([dx, dz])
+    } else {
+        Err("not above 0".into())
+    }
+}
+
+/// A band by its number from 1, or else by its name.
+pub(super) fn band(text: &str) -> Result<Band, String> {
+    match text.parse() {
+        Ok(0) => Err("bands are counted from 1".into()),
+        Ok(number) => Ok(Band::Number(number)),
+        Err(_) if text.is_empty() => Err("a number or a name is wanted".into()),
+        Err(_) => Ok(Band::Name(text.into())),
+    }
+}
+
+/// Size and type `WxH:TYPE`.
+pub(super) fn raw(text: &str) -> Result<RawLayout, String> {
+    let wanted = || "not a size and a type, as in 1024x1024:int16".to_string();
+    let (size, kind) = text.split_once(':').ok_or_else(wanted)?;
+    let (width, height) = size.split_once('x').ok_or_else(wanted)?;
+    let kind = kind.to_ascii_lowercase();
+    let (name, big_endian) = match kind.strip_suffix("be") {
+        Some(name) => (name, true),
+        None => (kind.strip_suffix("le").unwrap_or(&kind), false),
+    };
+    let sample = SampleType::parse(name)
+        .ok_or_else(|| format!("{kind:?} is no type; uint8 to int64, float32 and float64 are"))?;
+    let side = |text: &str| text.parse().ok().filter(|n| *n > 0).ok_or_else(wanted);
+    Ok(RawLayout {
+        width: side(width)?,
+        height: side(height)?,
+        sample,
+        big_endian,
+    })
+}
+
+/// A rectangle of samples `X,Y,W,H`.
+pub(super) fn samples(text: &str) -> Result<Rect, String> {
+    let wanted = || "not four whole numbers: first column, first row, columns, rows".to_string();
+    let values: Vec<i64> = text
+        .split(',')
+        .map(|part| part.trim().parse().map_err(|_| wanted()))
+        .collect::<Result<_, _>>()?;
+    let [x, z, width, height] = values[..] else {
+        return Err(wanted());
+    };
+    let ends = x.checked_add(width).zip(z.checked_add(height));
+    match ends {
+        Some((x1, z1)) if width > 0 && height > 0 => Ok(Rect::new(x, z, x1, z1)),
+        _ => Err("a rectangle without samples".into()),
     }
 }
 
@@ -38,6 +109,16 @@ pub(super) fn sun(text: &str) -> Result<Sun, String> {
 /// A filter by its name.
 pub(super) fn filter() -> impl TypedValueParser<Value = FilterKind> {
     PossibleValuesParser::new(FilterKind::ALL.map(FilterKind::name)).try_map(|name| name.parse())
+}
+
+/// A part of a terrain, by its name.
+#[cfg(feature = "dem")]
+pub(super) fn part(text: &str) -> Result<PartKind, String> {
+    let known = PartKind::NAMED.iter().find(|(name, _)| *name == text);
+    known.map(|(_, kind)| *kind).ok_or_else(|| {
+        let names = PartKind::NAMED.map(|(name, _)| name);
+        format!("not one of {}", names.join(", "))
+    })
 }
 
 /// Bytes: `4096`, `512M`, `2GiB`. K, M, G and T, with or without iB, are powers of 1024; KB to TB of 1000.

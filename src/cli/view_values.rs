@@ -13,6 +13,11 @@ pub(super) fn place(text: &str) -> Result<[f64; 3], String> {
     numbers(text)
 }
 
+/// A place `E,N` in a DEM's reference system.
+pub(super) fn crs_place(text: &str) -> Result<[f64; 2], String> {
+    numbers(text)
+}
+
 /// A pitch in degrees.
 pub(super) fn pitch(text: &str) -> Result<f64, String> {
     let pitch = number(text)?;

@@ -15,6 +15,7 @@ mod collider;
 mod drawn;
 mod ground;
 mod line;
+mod places;
 mod quad;
 pub mod ray;
 mod s0;
@@ -25,6 +26,7 @@ mod truth;
 use glam::DVec3;
 
 pub use collider::{Collider, MAX_COLLIDER_SAMPLES, collider};
+pub use places::Places;
 pub use quad::{Quad, Triangle};
 pub use ray::Crossing;
 pub use s0::S0;

@@ -7,11 +7,11 @@
 mod header;
 
 use std::io::BufReader;
-use std::sync::Arc;
 
 use self::header::{Header, Key, Words, key, number, shown};
 use super::held::{HEIGHTS_ASSUMED, Held, Scale, Values, check_claim, size};
-use super::{Cursor, Description, ReadAt, geographic};
+use super::open::Input;
+use super::{Cursor, Description, unnamed};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Grid;
 
@@ -30,7 +30,10 @@ pub(super) fn is_ascii_grid(head: &[u8]) -> bool {
 }
 
 /// Reads the grid `name`.
-pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
+pub(super) fn open(input: &Input) -> Result<Held> {
+    let name = input.name;
+    input.options.band_index(name, 1)?;
+    let bytes = input.bytes.clone();
     let file_bytes = bytes.size_bytes();
     let mut words = Words {
         name,
@@ -47,7 +50,7 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
     let count = check_claim(name, width, height, 1, file_bytes)?;
 
     let mut values = Values::new(name, count)?;
-    let nodata = header.get(Key::Nodata);
+    let nodata = input.options.nodata.or(header.get(Key::Nodata));
     let mut whole = true;
     let mut word = first;
     for index in 0..count {
@@ -71,35 +74,15 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
     let heights = values.finish(name, Scale::METRES)?;
 
     let size = size(width, height);
-    let mut assumed = Vec::new();
-    let place = header.place(name, height)?;
     let pixel = header.pixel(name)?;
-    let mut spacing_m = pixel;
-    let place = match place {
-        Some(mut place) => {
-            place.geographic = geographic::looks_like_degrees(&place, size);
-            if place.geographic {
-                let (metres, sentence) = geographic::spacing_m(&place, size)
-                    .map_err(|what| Error::new(ErrorKind::Broken, name, what))?;
-                spacing_m = metres;
-                assumed.extend([geographic::DEGREES_ASSUMED.into(), sentence]);
-            } else {
-                assumed.push(geographic::METRES_ASSUMED.into());
-            }
-            Some(place)
-        }
-        None => {
-            assumed
-                .push("The file does not say where it lies; its cell size is taken to be in metres.".into());
-            None
-        }
-    };
+    let located = unnamed::locate(input, header.place(name, height)?, pixel, size)?;
+    let mut assumed = located.assumed;
     assumed.push(HEIGHTS_ASSUMED.into());
     assumed.extend(heights.infinite_sentence());
     let description = Description {
         grid: Grid {
             base_m: heights.base_m,
-            ..Grid::new(size.width, size.height, spacing_m)
+            ..Grid::new(size.width, size.height, located.spacing_m)
         },
         format: "ESRI ASCII".into(),
         sample_type: if whole {
@@ -109,7 +92,7 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
         }
         .into(),
         step_m: whole.then_some(1.0),
-        place,
+        place: located.place,
         vertical_unit: "unknown".into(),
         assumed,
         name: name.into(),
@@ -119,11 +102,15 @@ pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{HeightSource, Registration};
+    use super::super::{HeightSource, OpenOptions, Registration, geographic};
     use super::*;
 
     fn read(text: &str) -> Result<(Description, Vec<f32>)> {
-        let held = open("t.asc", Arc::new(text.as_bytes().to_vec()))?;
+        let held = open(&Input::bare(
+            "t.asc",
+            text.as_bytes().to_vec(),
+            &OpenOptions::default(),
+        ))?;
         let mut out = vec![0.0; held.description().grid.size.samples() as usize];
         held.read(held.description().grid.size.rect(), &mut out)?;
         Ok((held.description().clone(), out))
@@ -172,6 +159,28 @@ mod tests {
     }
 
     #[test]
+    fn decimal_commas_are_points() {
+        let (d, heights) = read("ncols 2\nnrows 1\ncellsize ,5E+2\nNODATA_value -1,5\n2,5 -1,5").unwrap();
+        assert!(heights[0] == 2.5 && heights[1].is_nan());
+        assert_eq!(d.grid.spacing_m, [50.0, 50.0]);
+    }
+
+    #[test]
+    fn voids_are_what_the_header_names_in_any_spelling_and_nan() {
+        for (nodata, void) in [
+            ("-9999", "-9999.000"),
+            ("-3.4028235e+38", "-3.4028235e38"),
+            ("nan", "NaN"),
+            ("1e3", "1000"),
+            ("-inf", "-inf"),
+        ] {
+            let text = format!("ncols 2\nnrows 1\ncellsize 1\nNODATA_VALUE {nodata}\n{void} 7");
+            let (_, heights) = read(&text).unwrap();
+            assert!(heights[0].is_nan() && heights[1] == 7.0, "{nodata}: {heights:?}");
+        }
+    }
+
+    #[test]
     fn wide_values_get_a_base() {
         let (d, heights) = read("ncols 2\nnrows 1\ncellsize 1\n10000000.25 10000001.5").unwrap();
         assert_eq!((d.grid.base_m, heights), (10_000_000.25, vec![0.0, 1.25]));
@@ -182,9 +191,9 @@ mod tests {
     fn faults_are_named_with_their_line() {
         let cases = [
             (
-                SMALL.replace("5.5", "5,5"),
-                ErrorKind::Unsupported,
-                "line 8: \"5,5\" has a decimal comma",
+                SMALL.replace("5.5", "5,5,5"),
+                ErrorKind::Broken,
+                "line 8: \"5,5,5\" is not a number",
             ),
             (
                 SMALL.replace("5.5", "x5"),

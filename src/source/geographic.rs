@@ -9,29 +9,90 @@
 use super::Georeference;
 use crate::grid::Size;
 
-/// Semi-major axis of WGS84 in metres.
-const A_M: f64 = 6_378_137.0;
-/// Flattening of WGS84.
-const F: f64 = 1.0 / 298.257_223_563;
-
-/// Metres that a step of (`longitude_deg`, `latitude_deg`) degrees spans at latitude `at_deg`.
-fn metres(at_deg: f64, longitude_deg: f64, latitude_deg: f64) -> [f64; 2] {
-    let e2 = F * (2.0 - F);
-    let (sin, cos) = at_deg.to_radians().sin_cos();
-    let w2 = 1.0 - e2 * sin * sin;
-    let parallel_m = A_M / w2.sqrt() * cos;
-    let meridian_m = A_M * (1.0 - e2) / (w2 * w2.sqrt());
-    [
-        parallel_m * longitude_deg.to_radians(),
-        meridian_m * latitude_deg.to_radians(),
-    ]
+/// The figure of the earth of a reference system.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ellipsoid {
+    name: &'static str,
+    /// Semi-major axis in metres.
+    a_m: f64,
+    /// Flattening.
+    f: f64,
 }
 
-/// The spacing in metres of a grid placed in degrees, and the sentence that says so.
+impl Ellipsoid {
+    /// That of systems that name none.
+    pub(super) const WGS84: Self = Self {
+        name: "WGS84",
+        a_m: 6_378_137.0,
+        f: 1.0 / 298.257_223_563,
+    };
+
+    /// The ellipsoid of an EPSG code: its own, or that of a geographic system in use.
+    #[cfg(feature = "dem")]
+    pub(super) fn of_code(code: u16) -> Option<Self> {
+        let (name, a_m, inverse_f) = match code {
+            7030 | 4326 | 4979 => return Some(Self::WGS84),
+            7019 | 4269 | 4258 | 4283 | 4167 | 6318 | 7844 => ("GRS 1980", 6_378_137.0, 298.257_222_101),
+            7043 | 4322 => ("WGS 72", 6_378_135.0, 298.26),
+            7022 | 4230 => ("International 1924", 6_378_388.0, 297.0),
+            7004 | 4314 => ("Bessel 1841", 6_377_397.155, 299.152_812_8),
+            7024 | 4284 => ("Krassowsky 1940", 6_378_245.0, 298.3),
+            7001 | 4277 => ("Airy 1830", 6_377_563.396, 299.324_964_6),
+            // Clarke's axes of 1866 are given in metres: 6378206.4 and 6356583.8.
+            7008 | 4267 => ("Clarke 1866", 6_378_206.4, 294.978_698_213_898),
+            7012 => ("Clarke 1880 (RGS)", 6_378_249.145, 293.465),
+            7011 | 4275 => ("Clarke 1880 (IGN)", 6_378_249.2, 293.466_021_293_627),
+            _ => return None,
+        };
+        Some(Self {
+            name,
+            a_m,
+            f: 1.0 / inverse_f,
+        })
+    }
+
+    /// The ellipsoid of a semi-major axis in metres and a flattening, if they are the earth's.
+    #[cfg(feature = "dem")]
+    pub(super) fn of_axes(a_m: f64, f: f64) -> Option<Self> {
+        let earth = (6.3e6..6.5e6).contains(&a_m) && (0.0..0.01).contains(&f);
+        earth.then_some(Self {
+            name: "file's own",
+            a_m,
+            f,
+        })
+    }
+
+    /// Metres that a step of (`longitude_deg`, `latitude_deg`) degrees spans at latitude `at_deg`.
+    fn metres(&self, at_deg: f64, longitude_deg: f64, latitude_deg: f64) -> [f64; 2] {
+        let e2 = self.f * (2.0 - self.f);
+        let (sin, cos) = at_deg.to_radians().sin_cos();
+        let w2 = 1.0 - e2 * sin * sin;
+        let parallel_m = self.a_m / w2.sqrt() * cos;
+        let meridian_m = self.a_m * (1.0 - e2) / (w2 * w2.sqrt());
+        [
+            parallel_m * longitude_deg.to_radians(),
+            meridian_m * latitude_deg.to_radians(),
+        ]
+    }
+}
+
+/// The spacing in metres of a grid placed in degrees, on WGS84, and the sentence that says so.
 ///
 /// # Errors
 /// A phrase, where its latitudes are not on the earth.
 pub(super) fn spacing_m(place: &Georeference, size: Size) -> Result<([f64; 2], String), String> {
+    spacing_on(None, place, size)
+}
+
+/// The same on an ellipsoid; on WGS84 where none is known, which is then said.
+///
+/// # Errors
+/// As [`spacing_m`].
+pub(super) fn spacing_on(
+    ellipsoid: Option<Ellipsoid>,
+    place: &Georeference,
+    size: Size,
+) -> Result<([f64; 2], String), String> {
     let [_, first] = place.origin;
     let [_, last] = place.place(0.0, (size.height - 1) as f64);
     let middle = 0.5 * (first + last);
@@ -40,13 +101,30 @@ pub(super) fn spacing_m(place: &Georeference, size: Size) -> Result<([f64; 2], S
             "its latitudes, {first} to {last} degrees, are not between -90 and 90"
         ));
     }
-    let spacing_m = metres(middle, place.pixel[0].abs(), place.pixel[1].abs());
+    let figure = ellipsoid.unwrap_or(Ellipsoid::WGS84);
+    let [px, py] = place.pixel.map(f64::abs);
+    let spacing_m = figure.metres(middle, px, py);
+    // What one spacing for all rows costs is greatest at the northern or the southern edge.
+    let [north, south] = [first, last].map(|at| {
+        let [width_m, _] = figure.metres(at, px, py);
+        100.0 * (width_m / spacing_m[0] - 1.0)
+    });
     let sentence = format!(
-        "Its degrees are turned into a spacing of {:.3} x {:.3} m on the WGS84 ellipsoid at its middle latitude, \
-         {middle:.4}.",
-        spacing_m[0], spacing_m[1]
+        "Its degrees are turned into a spacing of {:.3} x {:.3} m on the {} ellipsoid at its middle latitude, \
+         {middle:.4}; true columns are {} apart at its northern edge and {} at its southern.",
+        spacing_m[0],
+        spacing_m[1],
+        figure.name,
+        share(north),
+        share(south)
     );
     Ok((spacing_m, sentence))
+}
+
+/// By how many hundredths something is more or less, as words.
+fn share(percent: f64) -> String {
+    let direction = if percent < 0.0 { "less" } else { "more" };
+    format!("{:.2} % {direction}", percent.abs())
 }
 
 /// Whether a grid without a named reference system can only sensibly be in degrees: steps below 0.1, and all of
@@ -84,15 +162,33 @@ mod tests {
             (45.0, 78_846.835, 111_131.778),
             (60.0, 55_800.0, 111_412.27),
         ] {
-            let [x, z] = metres(at, 1.0, 1.0);
+            let [x, z] = Ellipsoid::WGS84.metres(at, 1.0, 1.0);
             assert!((x - longitude_m).abs() < 0.5, "{at}: {x}");
             assert!((z - latitude_m).abs() < 1.0, "{at}: {z}");
         }
         // The meridian's quarter, 10,001,965.729 m, is the sum of its degrees.
         let quarter: f64 = (0..9000)
-            .map(|i| metres((f64::from(i) + 0.5) / 100.0, 0.0, 0.01)[1])
+            .map(|i| Ellipsoid::WGS84.metres((f64::from(i) + 0.5) / 100.0, 0.0, 0.01)[1])
             .sum();
         assert!((quarter - 10_001_965.729).abs() < 0.01, "{quarter}");
+    }
+
+    #[cfg(feature = "dem")]
+    #[test]
+    fn a_systems_own_ellipsoid_is_taken() {
+        let of = |code| Ellipsoid::of_code(code).unwrap();
+        assert_eq!(of(4326), Ellipsoid::WGS84);
+        // Snyder, table 1: a degree of longitude on the equator of Clarke 1866 is 111,320.7 m; his table of the
+        // meridian's: 111,699.4 m at the pole end, 110,567.2 m at the equator.
+        let clarke = of(4267);
+        assert!((clarke.metres(0.0, 1.0, 0.0)[0] - 111_320.7).abs() < 0.1);
+        assert!((clarke.metres(0.5, 0.0, 1.0)[1] - 110_567.2).abs() < 1.0);
+        assert!((clarke.metres(89.5, 0.0, 1.0)[1] - 111_699.4).abs() < 1.0);
+        let minor_m = clarke.a_m * (1.0 - clarke.f);
+        assert!((minor_m - 6_356_583.8).abs() < 1e-3, "{minor_m}");
+        assert_eq!(Ellipsoid::of_code(32633), None);
+        assert_eq!(Ellipsoid::of_axes(1_737_400.0, 0.0), None, "the moon");
+        assert!(Ellipsoid::of_axes(6_371_000.0, 0.0).is_some());
     }
 
     fn place(origin: [f64; 2], pixel: f64) -> Georeference {
@@ -112,8 +208,16 @@ mod tests {
             height: 11,
         };
         let ([dx, dz], sentence) = spacing_m(&place([1.0, 43.0], 0.1), size).unwrap();
-        assert_eq!([dx, dz], metres(42.5, 0.1, 0.1));
-        assert!(sentence.contains("42.5"), "{sentence}");
+        assert_eq!([dx, dz], Ellipsoid::WGS84.metres(42.5, 0.1, 0.1));
+        assert!(
+            sentence.contains("WGS84 ellipsoid") && sentence.contains("42.5"),
+            "{sentence}"
+        );
+        // cos 43 / cos 42.5 is 0.99195, cos 42 / cos 42.5 is 1.00796; the ellipsoid adds a hundredth of that.
+        assert!(
+            sentence.contains("0.80 % less apart at its northern edge and 0.79 % more"),
+            "{sentence}"
+        );
         assert!(spacing_m(&place([1.0, 91.0], 0.1), size).is_err());
         assert!(spacing_m(&place([1.0, f64::NAN], 0.1), size).is_err());
         let pole = Size { width: 1, height: 1 };

@@ -6,7 +6,7 @@ use crate::grid::{Grid, MAX_SIZE, Rect, Size};
 
 /// No lossless coder in use packs more than this many bytes of samples into one byte of a file (deflate,
 /// the densest, ends at 1032).
-const MAX_COMPRESSION: u64 = 1040;
+pub(super) const MAX_COMPRESSION: u64 = 1040;
 
 /// A DEM whose heights are all in memory.
 #[derive(Debug)]
@@ -35,14 +35,11 @@ impl HeightSource for Held {
     }
 
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {
-        let size = self.description.grid.size;
-        if !size.rect().contains_rect(rect) || out.len() as i64 != rect.area() {
-            let what = format!("{rect:?} with {} places does not fit {size:?}", out.len());
-            return Err(Error::new(ErrorKind::Misuse, &self.description.name, what));
-        }
+        self.description.check_rect(rect, out)?;
         if rect.is_empty() {
             return Ok(());
         }
+        let size = self.description.grid.size;
         for (z, row) in (rect.z0..rect.z1).zip(out.chunks_exact_mut(rect.width() as usize)) {
             let start = (z * size.width + rect.x0) as usize;
             row.copy_from_slice(&self.heights[start..start + row.len()]);
@@ -173,13 +170,6 @@ impl Values {
         Ok(())
     }
 
-    /// Turns the order of rows about: the last of `width` values becomes the first.
-    #[cfg(feature = "dem")]
-    pub(super) fn flip_rows(&mut self, width: usize) {
-        flip(&mut self.exact, width);
-        flip(&mut self.wide, width);
-    }
-
     /// The heights in metres, each rounded once to f32.
     ///
     /// # Errors
@@ -221,13 +211,18 @@ impl Values {
 impl Heights {
     /// What `assumed` says of infinite heights, if there were any.
     pub(super) fn infinite_sentence(&self) -> Option<String> {
-        match self.infinite {
-            0 => None,
-            1 => Some("One height is infinite or beyond f32; it is taken as no data.".into()),
-            n => Some(format!(
-                "{n} heights are infinite or beyond f32; they are taken as no data."
-            )),
-        }
+        infinite_sentence(self.infinite)
+    }
+}
+
+/// What is said of `count` infinite heights, if there are any.
+pub(super) fn infinite_sentence(count: u64) -> Option<String> {
+    match count {
+        0 => None,
+        1 => Some("One height is infinite or beyond f32; it is taken as no data.".into()),
+        n => Some(format!(
+            "{n} heights are infinite or beyond f32; they are taken as no data."
+        )),
     }
 }
 
@@ -251,8 +246,9 @@ pub(super) fn bare_description(name: &str, format: &str, sample_type: &str, size
 /// What `assumed` says where a file names no unit of heights.
 pub(super) const HEIGHTS_ASSUMED: &str = "The unit of heights is unknown and taken as metres.";
 
+/// Turns the order of rows about: the last of `width` values becomes the first.
 #[cfg(feature = "dem")]
-fn flip<T>(values: &mut [T], width: usize) {
+pub(super) fn flip<T>(values: &mut [T], width: usize) {
     let rows = values.len() / width.max(1);
     for z in 0..rows / 2 {
         let (north, south) = values.split_at_mut((rows - 1 - z) * width);

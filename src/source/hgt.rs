@@ -1,30 +1,37 @@
-//! SRTM tiles, `.hgt`: a square of big-endian 16-bit heights without a header.
+//! SRTM tiles, `.hgt`: a rectangle of big-endian 16-bit heights without a header.
 //!
-//! A tile of one degree holds 1201 x 1201 (3 arc seconds) or 3601 x 3601 (1 arc second) heights in metres
-//! above the EGM96 geoid, rows from north to south, -32768 for no data; samples lie on whole arc seconds, so
-//! neighbours share their border. The name, as `N42E001.hgt`, is the place of the *south-west* sample (USGS,
-//! SRTM Topo, quickstart document of version 2, sections 2.1.1 to 2.1.3).
+//! A tile of one degree holds 1201 x 1201 (3 arc seconds), 3601 x 3601 (1 arc second) or, beyond 50 degrees north or
+//! south, 1801 x 3601 (2 by 1 arc seconds) heights in metres above the EGM96 geoid, rows from north to south, -32768
+//! for no data; samples lie on whole arc seconds, so neighbours share their border. The name, as `N42E001.hgt`, is the
+//! place of the *south-west* sample (USGS, SRTM Topo, quickstart document of version 2, sections 2.1.1 to 2.1.3).
 
-use super::held::{Held, Scale, Values, size};
-use super::{Description, Georeference, ReadAt, Registration, geographic};
+use super::flat::{Flat, Layout};
+use super::open::Input;
+use super::sample::Coding;
+use super::{Description, Georeference, Registration, SampleType, geographic};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Grid;
 
-const SIDES: [u64; 2] = [1201, 3601];
-const VOID: i16 = -32768;
+/// Columns and rows of a tile.
+const SIZES: [[u64; 2]; 3] = [[1201, 1201], [3601, 3601], [1801, 3601]];
+const VOID: f64 = -32768.0;
 
-/// Reads the tile `name`, a path that ends in a name like `N42E001.hgt`.
-pub(super) fn open(name: &str, bytes: &dyn ReadAt) -> Result<Held> {
-    let length = bytes.size_bytes();
-    let side = SIDES.into_iter().find(|n| 2 * n * n == length).ok_or_else(|| {
-        let what = format!(
-            "{length} bytes are no SRTM tile, which has {} (1201 x 1201) or {} (3601 x 3601)",
-            2 * 1201 * 1201,
-            2 * 3601 * 3601
-        );
-        Error::new(ErrorKind::Broken, name, what).advice("fetch the file again")
-    })?;
-    let [longitude, latitude] = corner(name).ok_or_else(|| {
+/// Opens the tile `input`, whose own name or whose archive's tells its place, as `N42E001.hgt`.
+pub(super) fn open(input: &Input) -> Result<Flat> {
+    let Input { name, options, .. } = *input;
+    options.band_index(name, 1)?;
+    let length = input.bytes.size_bytes();
+    let [width, height] = SIZES
+        .into_iter()
+        .find(|[w, h]| 2 * w * h == length)
+        .ok_or_else(|| {
+            let all = SIZES
+                .map(|[w, h]| format!("{} ({w} x {h})", 2 * w * h))
+                .join(" or ");
+            let what = format!("{length} bytes are no SRTM tile, which has {all}");
+            Error::new(ErrorKind::Broken, name, what).advice("fetch the file again")
+        })?;
+    let [longitude, latitude] = corner(input.file_name).or_else(|| corner(name)).ok_or_else(|| {
         Error::new(
             ErrorKind::Broken,
             name,
@@ -32,40 +39,26 @@ pub(super) fn open(name: &str, bytes: &dyn ReadAt) -> Result<Held> {
         )
         .advice("name it like N42E001.hgt, after its south-west corner")
     })?;
-
-    let mut values = Values::new(name, (side * side) as usize)?;
-    let mut row = vec![0u8; 2 * side as usize];
-    for z in 0..side {
-        let row_bytes = row.len() as u64;
-        bytes
-            .read_exact_at(z * row_bytes, &mut row)
-            .map_err(|error| Error::io(name, error))?;
-        for (x, pair) in row.chunks_exact(2).enumerate() {
-            let value = i16::from_be_bytes([pair[0], pair[1]]);
-            let height = if value == VOID { f64::NAN } else { f64::from(value) };
-            values.set(name, (z * side) as usize + x, height)?;
-        }
-    }
-    let heights = values.finish(name, Scale::METRES)?;
-
-    let step = 1.0 / (side - 1) as f64;
+    let coding = Coding {
+        sample: SampleType::I16,
+        big_endian: true,
+        nodata: Some(options.nodata.unwrap_or(VOID)),
+    };
+    let layout = Layout::dense(width, height, coding);
+    let size = layout.check(name, length)?;
     let place = Georeference {
         crs: Some("EPSG:4326".into()),
         origin: [longitude, latitude + 1.0],
-        pixel: [step, -step],
+        pixel: [1.0 / (width - 1) as f64, -1.0 / (height - 1) as f64],
         registration: Registration::Point,
         geographic: true,
     };
-    let size = size(side, side);
     let (spacing_m, sentence) =
         geographic::spacing_m(&place, size).map_err(|what| Error::new(ErrorKind::Broken, name, what))?;
     let description = Description {
-        grid: Grid {
-            base_m: heights.base_m,
-            ..Grid::new(size.width, size.height, spacing_m)
-        },
+        grid: Grid::new(size.width, size.height, spacing_m),
         format: "SRTM".into(),
-        sample_type: "int16".into(),
+        sample_type: coding.sample.name().into(),
         step_m: Some(1.0),
         place: Some(place),
         vertical_unit: "metre".into(),
@@ -76,7 +69,7 @@ pub(super) fn open(name: &str, bytes: &dyn ReadAt) -> Result<Held> {
         ],
         name: name.into(),
     };
-    Held::new(description, heights.heights)
+    Flat::new(description, input.bytes.clone(), layout)
 }
 
 /// Longitude and latitude of the south-west sample, from a name like `N42E001` or `s29w072`, with or without
@@ -104,9 +97,13 @@ fn corner(name: &str) -> Option<[f64; 2]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::HeightSource;
+    use super::super::{HeightSource, OpenOptions};
     use super::*;
     use crate::grid::Rect;
+
+    fn open(name: &str, bytes: &[u8]) -> Result<Flat> {
+        super::open(&Input::bare(name, bytes.to_vec(), &OpenOptions::default()))
+    }
 
     fn tile() -> Vec<u8> {
         let mut bytes = vec![0u8; 2 * 1201 * 1201];
@@ -156,8 +153,12 @@ mod tests {
         ] {
             assert_eq!(corner(bad), None, "{bad}");
         }
-        assert_eq!(open("hills.hgt", &tile()).unwrap_err().kind(), ErrorKind::Broken);
-        let error = open("N42E001.hgt", &tile()[..2_884_000].to_vec()).unwrap_err();
+        assert_eq!(
+            open("hills.hgt", &tile()).err().unwrap().kind(),
+            ErrorKind::Broken
+        );
+        assert!(open("N60E001.hgt", &vec![0; 2 * 1801 * 3601]).is_ok());
+        let error = open("N42E001.hgt", &tile()[..2_884_000]).err().unwrap();
         assert!(error.to_string().contains("2884000 bytes"), "{error}");
     }
 }

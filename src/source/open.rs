@@ -1,11 +1,15 @@
 //! Opens a DEM: tells its format by its first bytes, or by the name's ending where a format has none.
 
+use std::ffi::OsStr;
 use std::fs::{self, File};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::file::OpenFile;
-use super::{HeightSource, ReadAt, ascii_grid, hgt, openexr};
+use super::mosaic::Mosaic;
+use super::{
+    HeightSource, OpenOptions, ReadAt, Synth, ascii_grid, crop, dted, ehdr, envi, hgt, openexr, raw, usgs_dem,
+};
 use crate::error::{Error, ErrorKind, Result};
 
 /// The formats by what messages call them, and the endings that promise them.
@@ -15,20 +19,214 @@ enum Format {
     Png,
     OpenExr,
     Srtm,
+    Dted,
+    UsgsDem,
     AsciiGrid,
 }
 
 /// Bytes from which a format is told.
-const HEAD_BYTES: usize = 512;
+const HEAD_BYTES: usize = 2048;
 
-const READ_HERE: &str = "give a GeoTIFF, a grey PNG, OpenEXR, SRTM .hgt or ESRI ASCII .asc";
+/// The most bytes of a text header beside a file.
+const HEADER_BYTES: u64 = 1 << 16;
 
-/// Opens the DEM at `path`; messages speak of it by the path as given.
+/// Files of a folder, or tiles of a mosaic, at most.
+const MAX_FILES: usize = 1 << 16;
+
+const READ_HERE: &str = "give a GeoTIFF, a grey PNG, OpenEXR, SRTM .hgt, DTED, USGS .dem, ESRI .asc, .bil or .flt, ENVI, or --raw";
+
+/// Endings by which a folder's DEMs are known; `.hdr` beside makes one of any other.
+const ENDINGS: [&str; 17] = [
+    "tif", "tiff", "png", "exr", "hgt", "asc", "agr", "dem", "dt0", "dt1", "dt2", "bil", "bip", "bsq", "flt",
+    "r16", "r32",
+];
+
+/// A file that is to be read as a DEM.
+pub(super) struct Input<'a> {
+    /// The name by which messages speak of it.
+    pub(super) name: &'a str,
+    /// Its own name, which may tell its format and place: that of the file within an archive.
+    pub(super) file_name: &'a str,
+    pub(super) bytes: Arc<dyn ReadAt>,
+    pub(super) options: &'a OpenOptions,
+    /// The file beside it of the same name but for this ending, if there is one.
+    pub(super) beside: &'a Beside<'a>,
+}
+
+/// Finds a file beside another by its ending.
+pub(super) type Beside<'a> = dyn Fn(&str) -> Result<Option<Arc<dyn ReadAt>>> + 'a;
+
+impl Input<'_> {
+    /// The ending of its own name in small letters; empty where it has none.
+    pub(super) fn ending(&self) -> String {
+        ending(self.file_name)
+    }
+}
+
+#[cfg(test)]
+impl<'a> Input<'a> {
+    /// A file in memory with nothing beside it.
+    pub(super) fn bare(name: &'a str, bytes: Vec<u8>, options: &'a OpenOptions) -> Self {
+        Self {
+            name,
+            file_name: name,
+            bytes: Arc::new(bytes),
+            options,
+            beside: &|_| Ok(None),
+        }
+    }
+}
+
+fn ending(name: &str) -> String {
+    let ending = Path::new(name).extension();
+    ending
+        .map(|e| e.to_string_lossy().to_ascii_lowercase())
+        .unwrap_or_default()
+}
+
+/// Opens the DEM at `path` as its file gives it; messages speak of it by the path as given.
 ///
 /// # Errors
-/// One clear line where the file is missing, no plain file, empty, damaged, or of a kind that is not read.
+/// As [`open_with`].
 pub fn open(path: &Path) -> Result<Box<dyn HeightSource>> {
-    open_bytes(&path.display().to_string(), open_file(path)?)
+    open_with(&[path], &OpenOptions::default())
+}
+
+/// Opens the DEM in `inputs`: a file, `synth:SIZE[:SEED]`, or a mosaic of files and of the DEMs in folders, sorted by
+/// name, where the later ones win. Tiles of a mosaic are read as they are asked for.
+///
+/// # Errors
+/// One clear line where an input is missing, no plain file, empty, damaged, of a kind that is not read or off the grid
+/// of the others, and where the options do not suit it.
+pub fn open_with(inputs: &[impl AsRef<Path>], options: &OpenOptions) -> Result<Box<dyn HeightSource>> {
+    let whole: Box<dyn HeightSource> = match inputs {
+        [] => return Err(Error::new(ErrorKind::Misuse, "input", "is missing").advice(READ_HERE)),
+        [one] if let Some(synth) = one.as_ref().to_str().and_then(Synth::parse) => {
+            options.refuse_of_file("synth:")?;
+            Box::new(synth?)
+        }
+        [one] if !one.as_ref().is_dir() => open_path(one.as_ref(), options)?,
+        many => Box::new(open_mosaic(many, options)?),
+    };
+    crop::apply(whole, options)
+}
+
+fn open_mosaic(inputs: &[impl AsRef<Path>], options: &OpenOptions) -> Result<Mosaic> {
+    let of_tile = OpenOptions {
+        crop: None,
+        spacing_m: None,
+        ..options.clone()
+    };
+    Mosaic::new(
+        &name_of(inputs),
+        &files_of(inputs)?,
+        &of_tile,
+        Box::new(open_path),
+    )
+}
+
+/// The name by which messages speak of all of `inputs`: the first one's, and how many more there are.
+pub fn name_of(inputs: &[impl AsRef<Path>]) -> String {
+    match inputs {
+        [] => String::new(),
+        [one] => one.as_ref().display().to_string(),
+        [first, more @ ..] => format!("{} and {} more", first.as_ref().display(), more.len()),
+    }
+}
+
+/// The files of `inputs`: of a folder the DEMs in it. Procedural terrain has none.
+///
+/// # Errors
+/// Where a folder cannot be read or holds no DEM; [`ErrorKind::Limit`] for more files than a mosaic may have.
+pub fn files_of(inputs: &[impl AsRef<Path>]) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for input in inputs {
+        let path = input.as_ref();
+        if path.is_dir() {
+            files.extend(folder(path)?);
+        } else if path.to_str().and_then(Synth::parse).is_none() || inputs.len() > 1 {
+            files.push(path.to_path_buf());
+        }
+        if files.len() > MAX_FILES {
+            let what = format!("is a mosaic of more than {MAX_FILES} files");
+            return Err(Error::new(ErrorKind::Limit, path.display(), what));
+        }
+    }
+    Ok(files)
+}
+
+/// The DEMs of a folder, sorted by name: files whose ending promises one, packed or not.
+fn folder(path: &Path) -> Result<Vec<PathBuf>> {
+    let failed = |error| Error::io(path.display(), error);
+    let mut names = Vec::new();
+    for entry in fs::read_dir(path).map_err(failed)? {
+        names.push(entry.map_err(failed)?.path());
+        if names.len() > 4 * MAX_FILES {
+            let what = format!("holds more than {} files", 4 * MAX_FILES);
+            return Err(Error::new(ErrorKind::Limit, path.display(), what));
+        }
+    }
+    names.sort();
+    let has_header = |file: &Path| {
+        names
+            .iter()
+            .any(|n| n != file && n.file_stem() == file.file_stem() && is(n, "hdr"))
+    };
+    let mut files: Vec<PathBuf> = names
+        .iter()
+        .filter(|n| promises_dem(n, &has_header))
+        .cloned()
+        .collect();
+    files.retain(|f| f.is_file());
+    if files.is_empty() {
+        let what = "is a folder without any DEM";
+        return Err(Error::new(ErrorKind::Misuse, path.display(), what).advice(READ_HERE));
+    }
+    Ok(files)
+}
+
+fn is(file: &Path, wanted: &str) -> bool {
+    file.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted))
+}
+
+fn promises_dem(file: &Path, has_header: &dyn Fn(&Path) -> bool) -> bool {
+    let Some(name) = file.file_name().and_then(OsStr::to_str) else {
+        return false;
+    };
+    // A terrain file is made of a DEM, and lies beside it.
+    if name.starts_with('.') || name.ends_with(".terrain.exr") {
+        return false;
+    }
+    let name = name.to_ascii_lowercase();
+    if name.ends_with(".zip") {
+        return true;
+    }
+    let known = |name: &str| ENDINGS.contains(&ending(name).as_str());
+    match name.strip_suffix(".gz") {
+        Some(inner) => known(inner),
+        None => {
+            known(&name)
+                || (["dat", "img", "bin", "raw"].contains(&ending(&name).as_str()) && has_header(file))
+        }
+    }
+}
+
+fn open_path(path: &Path, options: &OpenOptions) -> Result<Box<dyn HeightSource>> {
+    let name = path.display().to_string();
+    let bytes = open_file(path)?;
+    let beside = |wanted: &str| {
+        // A name in small letters and one in capitals are looked for: listing folders of many tiles would cost more.
+        let candidates = [wanted.to_string(), wanted.to_ascii_uppercase()].map(|e| path.with_extension(e));
+        let found = candidates.iter().find(|c| c.is_file() && c.as_path() != path);
+        found.map(|c| open_file(c)).transpose()
+    };
+    open_input(&Input {
+        name: &name,
+        file_name: &name,
+        bytes,
+        options,
+        beside: &beside,
+    })
 }
 
 /// The bytes of the file at `path`, read where they are asked for.
@@ -51,11 +249,107 @@ pub fn open_file(path: &Path) -> Result<Arc<dyn ReadAt>> {
 }
 
 /// Opens the DEM in `bytes`, which messages call `name`. The name's ending decides where the bytes do not, and
-/// an SRTM tile's name is its place.
+/// an SRTM tile's name is its place. Nothing lies beside it.
 ///
 /// # Errors
-/// As [`open`].
-pub fn open_bytes(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSource>> {
+/// As [`open_with`].
+pub fn open_bytes(
+    name: &str,
+    bytes: Arc<dyn ReadAt>,
+    options: &OpenOptions,
+) -> Result<Box<dyn HeightSource>> {
+    let whole = open_input(&Input {
+        name,
+        file_name: name,
+        bytes,
+        options,
+        beside: &|_| Ok(None),
+    })?;
+    crop::apply(whole, options)
+}
+
+/// Opens a file, unpacked if it is packed.
+fn open_input(input: &Input) -> Result<Box<dyn HeightSource>> {
+    let head = head(input)?;
+    // A tile without a header may begin with anything, another format's first bytes included.
+    let headless = input.ending() == "hgt" || (input.options.raw.is_some() && raw::is_raw(&input.ending()));
+    if headless {
+        return open_plain(input, &head);
+    }
+    unpack(input, &head)
+}
+
+#[cfg(feature = "dem")]
+fn unpack(input: &Input, head: &[u8]) -> Result<Box<dyn HeightSource>> {
+    use super::archive::{self, Packing, Zip};
+    let name = input.name;
+    let inside = |file_name: &str, bytes: Arc<dyn ReadAt>, beside: &Beside| {
+        let inner = Input {
+            name,
+            file_name,
+            bytes,
+            options: input.options,
+            beside,
+        };
+        let head = self::head(&inner)?;
+        if Packing::of(&head).is_some() && inner.ending() != "hgt" {
+            let what = "holds another archive";
+            return Err(Error::new(ErrorKind::Unsupported, name, what).advice("unpack it first"));
+        }
+        open_plain(&inner, &head)
+    };
+    match Packing::of(head) {
+        None => open_plain(input, head),
+        Some(Packing::Gzip) => {
+            let unpacked = archive::gunzip(name, input.bytes.clone())?;
+            let file_name = input.file_name.strip_suffix(".gz").unwrap_or(input.file_name);
+            inside(file_name, unpacked, input.beside)
+        }
+        Some(Packing::Zip) => {
+            let zip = Zip::open(name, input.bytes.clone())?;
+            let with_header = |file: &Path| {
+                let header = file.with_extension("hdr");
+                zip.names()
+                    .any(|n| Path::new(n) != file && n.eq_ignore_ascii_case(&header.to_string_lossy()))
+            };
+            let dems: Vec<&str> = zip
+                .names()
+                .filter(|n| !n.starts_with("__MACOSX/") && ending(n) != "zip")
+                .filter(|n| {
+                    promises_dem(Path::new(n), &with_header)
+                        || (input.options.raw.is_some() && raw::is_raw(&ending(n)))
+                })
+                .collect();
+            let [file_name] = dems[..] else {
+                let what = match dems[..] {
+                    [] => "is a ZIP archive without any DEM".to_string(),
+                    [a, b, ..] => format!("is a ZIP archive of {} DEMs, {a} and {b} among them", dems.len()),
+                    [_] => unreachable!("one is opened"),
+                };
+                return Err(Error::new(ErrorKind::Unsupported, name, what).advice("unpack it first"));
+            };
+            let bytes = zip
+                .file(file_name)?
+                .ok_or_else(|| Error::new(ErrorKind::Broken, name, "is damaged"))?;
+            let beside =
+                |wanted: &str| zip.file(&Path::new(file_name).with_extension(wanted).to_string_lossy());
+            inside(file_name, bytes, &beside)
+        }
+    }
+}
+
+#[cfg(not(feature = "dem"))]
+fn unpack(input: &Input, head: &[u8]) -> Result<Box<dyn HeightSource>> {
+    match head {
+        [b'P', b'K', 3 | 5, 4 | 6, ..] => Err(left_out(input.name, "ZIP archive")),
+        [0x1f, 0x8b, ..] => Err(left_out(input.name, "gzip file")),
+        _ => open_plain(input, head),
+    }
+}
+
+/// The first bytes of a file that is not empty.
+fn head(input: &Input) -> Result<Vec<u8>> {
+    let Input { name, bytes, .. } = input;
     if bytes.size_bytes() == 0 {
         return Err(Error::new(ErrorKind::Broken, name, "is empty").advice("fetch the file again"));
     }
@@ -63,33 +357,92 @@ pub fn open_bytes(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSo
     bytes
         .read_exact_at(0, &mut head)
         .map_err(|error| Error::io(name, error))?;
-    Ok(match format(name, &head)? {
-        Format::GeoTiff => geotiff(name, bytes)?,
-        Format::Png => png(name, bytes)?,
-        Format::OpenExr => Box::new(openexr::open(name, bytes)?),
-        Format::Srtm => Box::new(hgt::open(name, bytes.as_ref())?),
-        Format::AsciiGrid => Box::new(ascii_grid::open(name, bytes)?),
+    Ok(head)
+}
+
+/// Opens a file that is not packed.
+fn open_plain(input: &Input, head: &[u8]) -> Result<Box<dyn HeightSource>> {
+    if let Some(layout) = input.options.raw {
+        return Ok(Box::new(raw::open(input, layout)?));
+    }
+    Ok(match told(input, head) {
+        Some(Format::GeoTiff) => geotiff(input)?,
+        Some(Format::Png) => png(input)?,
+        Some(Format::OpenExr) => Box::new(openexr::open(input)?),
+        Some(Format::Srtm) => Box::new(hgt::open(input)?),
+        Some(Format::Dted) => Box::new(dted::open(input)?),
+        Some(Format::UsgsDem) => Box::new(usgs_dem::open(input)?),
+        Some(Format::AsciiGrid) => Box::new(ascii_grid::open(input)?),
+        None => return beside_header(input, head),
     })
 }
 
-#[cfg(feature = "dem")]
-fn geotiff(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSource>> {
-    Ok(Box::new(super::geotiff::open(name, bytes)?))
+/// Opens a file whose header stands beside it.
+fn beside_header(input: &Input, head: &[u8]) -> Result<Box<dyn HeightSource>> {
+    let ending = input.ending();
+    if ending == "hdr" {
+        let what = "is the header of a DEM, not the DEM";
+        return Err(
+            Error::new(ErrorKind::Misuse, input.name, what).advice("name the file of samples beside it")
+        );
+    }
+    if let Some(text) = header_text(input)? {
+        if envi::is_header(&text) {
+            return Ok(Box::new(envi::open(input, &text)?));
+        }
+        if ehdr::is_header(&text) {
+            return Ok(Box::new(ehdr::open(input, &text)?));
+        }
+        let what = "has a .hdr beside it that is no header of ESRI's or ENVI's";
+        return Err(Error::new(ErrorKind::Unsupported, input.name, what)
+            .advice("give size and type with --raw, as in --raw 1024x1024:int16"));
+    }
+    if raw::is_raw(&ending) {
+        return Err(raw::untold(input.name, &ending));
+    }
+    if ["bil", "bip", "bsq", "flt"].contains(&ending.as_str()) {
+        let what = "has no header .hdr beside it";
+        return Err(Error::new(ErrorKind::Broken, input.name, what)
+            .advice("fetch it too, or give size and type with --raw"));
+    }
+    Err(unknown(input.name, &ending, head))
+}
+
+/// The text of the `.hdr` file beside the input, if there is one.
+fn header_text(input: &Input) -> Result<Option<String>> {
+    let Some(bytes) = (input.beside)("hdr")? else {
+        return Ok(None);
+    };
+    let mut text = vec![0; bytes.size_bytes().min(HEADER_BYTES) as usize];
+    bytes
+        .read_exact_at(0, &mut text)
+        .map_err(|error| Error::io(input.name, error))?;
+    // Descriptions may be in any alphabet; what counts is ASCII.
+    Ok(Some(String::from_utf8_lossy(&text).into_owned()))
 }
 
 #[cfg(feature = "dem")]
-fn png(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSource>> {
-    Ok(Box::new(super::png::open(name, bytes)?))
+fn geotiff(input: &Input) -> Result<Box<dyn HeightSource>> {
+    Ok(Box::new(super::geotiff::open(
+        input.name,
+        input.bytes.clone(),
+        input.options,
+    )?))
+}
+
+#[cfg(feature = "dem")]
+fn png(input: &Input) -> Result<Box<dyn HeightSource>> {
+    Ok(Box::new(super::png::open(input)?))
 }
 
 #[cfg(not(feature = "dem"))]
-fn geotiff(name: &str, _: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSource>> {
-    Err(left_out(name, "GeoTIFF"))
+fn geotiff(input: &Input) -> Result<Box<dyn HeightSource>> {
+    Err(left_out(input.name, "GeoTIFF"))
 }
 
 #[cfg(not(feature = "dem"))]
-fn png(name: &str, _: Arc<dyn ReadAt>) -> Result<Box<dyn HeightSource>> {
-    Err(left_out(name, "PNG"))
+fn png(input: &Input) -> Result<Box<dyn HeightSource>> {
+    Err(left_out(input.name, "PNG"))
 }
 
 #[cfg(not(feature = "dem"))]
@@ -98,25 +451,29 @@ fn left_out(name: &str, format: &str) -> Error {
     Error::new(ErrorKind::Unsupported, name, what).advice("build with the feature `dem`")
 }
 
-/// The format of a file that is called `name` and begins with `head`.
-fn format(name: &str, head: &[u8]) -> Result<Format> {
-    let ending = Path::new(name)
-        .extension()
-        .map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let ending = ending.as_deref().unwrap_or("");
-    // A tile without a header may begin with anything, another format's first bytes included.
+/// The format of a file that begins with `head`, if it can be told without a header beside it.
+fn told(input: &Input, head: &[u8]) -> Option<Format> {
+    let ending = input.ending();
     if ending == "hgt" {
-        return Ok(Format::Srtm);
+        return Some(Format::Srtm);
     }
     let begins = |magic: &[u8]| head.starts_with(magic);
-    let told = match () {
-        () if begins(b"II*\0") || begins(b"MM\0*") || begins(b"II+\0") || begins(b"MM\0+") => Format::GeoTiff,
-        () if begins(b"\x89PNG\r\n\x1a\n") => Format::Png,
-        () if begins(b"\x76\x2f\x31\x01") => Format::OpenExr,
-        () if ascii_grid::is_ascii_grid(head) || matches!(ending, "asc" | "agr") => Format::AsciiGrid,
-        () => return Err(unknown(name, ending, head)),
-    };
-    Ok(told)
+    match ending.as_str() {
+        _ if begins(b"II*\0") || begins(b"MM\0*") || begins(b"II+\0") || begins(b"MM\0+") => {
+            Some(Format::GeoTiff)
+        }
+        _ if begins(b"\x89PNG\r\n\x1a\n") => Some(Format::Png),
+        _ if begins(b"\x76\x2f\x31\x01") => Some(Format::OpenExr),
+        // ESRI's headers begin as its ASCII grids do.
+        "hdr" => None,
+        "dt0" | "dt1" | "dt2" => Some(Format::Dted),
+        "dem" => Some(Format::UsgsDem),
+        "asc" | "agr" => Some(Format::AsciiGrid),
+        _ if dted::is_dted(head) => Some(Format::Dted),
+        _ if usgs_dem::is_usgs_dem(head) => Some(Format::UsgsDem),
+        _ if ascii_grid::is_ascii_grid(head) => Some(Format::AsciiGrid),
+        _ => None,
+    }
 }
 
 /// What is wrong with a file of no known format.
@@ -125,16 +482,10 @@ fn unknown(name: &str, ending: &str, head: &[u8]) -> Error {
         "tif" | "tiff" => "TIFF",
         "png" => "PNG",
         "exr" => "OpenEXR file",
+        "zip" => "ZIP archive",
+        "gz" => "gzip file",
         _ => {
-            let what = match head {
-                [b'P', b'K', 3, 4, ..] => "is a ZIP archive",
-                [0x1f, 0x8b, ..] => "is compressed with gzip",
-                _ => {
-                    return Error::new(ErrorKind::Unsupported, name, "is no DEM of a known format")
-                        .advice(READ_HERE);
-                }
-            };
-            return Error::new(ErrorKind::Unsupported, name, what).advice("unpack it first");
+            return Error::new(ErrorKind::Unsupported, name, "is no DEM of a known format").advice(READ_HERE);
         }
     };
     let shown = &head[..head.len().min(8)];
@@ -147,7 +498,7 @@ mod tests {
     use super::*;
 
     fn failure(name: &str, bytes: &[u8]) -> Error {
-        match open_bytes(name, Arc::new(bytes.to_vec())) {
+        match open_bytes(name, Arc::new(bytes.to_vec()), &OpenOptions::default()) {
             Ok(_) => panic!("{name} was opened"),
             Err(error) => error,
         }
@@ -155,7 +506,8 @@ mod tests {
 
     #[test]
     fn first_bytes_decide_and_endings_only_where_there_are_none() {
-        let told = |name: &str, head: &[u8]| format(name, head).unwrap();
+        let options = OpenOptions::default();
+        let told = |name: &str, head: &[u8]| told(&Input::bare(name, Vec::new(), &options), head).unwrap();
         assert_eq!(told("a.png", b"II*\0...."), Format::GeoTiff);
         assert_eq!(told("a", b"MM\0+...."), Format::GeoTiff);
         assert_eq!(told("a.tif", b"\x89PNG\r\n\x1a\n"), Format::Png);
@@ -163,6 +515,8 @@ mod tests {
         assert_eq!(told("a.txt", b"ncols 4"), Format::AsciiGrid);
         assert_eq!(told("a.ASC", b"4 5 6"), Format::AsciiGrid);
         assert_eq!(told("N00E000.HGT", b"II*\0...."), Format::Srtm);
+        assert_eq!(told("a.DT1", b"...."), Format::Dted);
+        assert_eq!(told("a", b"UHL1"), Format::Dted);
     }
 
     #[test]
@@ -183,16 +537,25 @@ mod tests {
                 "is no OpenEXR file: it begins with \"\\n\\x1b[0m\"",
             ),
             (
-                "a.dem",
+                "a.md",
                 b"USGS",
                 ErrorKind::Unsupported,
                 "no DEM of a known format; give a GeoTIFF",
             ),
+            ("a.dem", b"USGS", ErrorKind::Broken, "ends within its header"),
             (
-                "a.hgt.zip",
-                b"PK\x03\x04",
-                ErrorKind::Unsupported,
-                "ZIP archive; unpack",
+                "a.zip",
+                b"hello",
+                ErrorKind::Broken,
+                "is no ZIP archive: it begins with \"hello\"",
+            ),
+            ("a.bil", b"1234", ErrorKind::Broken, "no header .hdr beside it"),
+            ("a.hdr", b"ncols 1", ErrorKind::Misuse, "header of a DEM"),
+            (
+                "a.r16",
+                b"1234",
+                ErrorKind::Misuse,
+                "as in --raw 1024x1024:uint16",
             ),
             (
                 "N42E001.hgt",
@@ -221,7 +584,7 @@ mod tests {
             assert_eq!(error.subject(), path.display().to_string());
             assert!(error.to_string().contains(part), "{error}");
         };
-        check(folder.path(), ErrorKind::Misuse, "is a folder");
+        check(folder.path(), ErrorKind::Misuse, "is a folder without any DEM");
         check(&folder.path().join("none.tif"), ErrorKind::Io, "no such file");
         let empty = folder.path().join("empty.tif");
         fs::write(&empty, "").unwrap();

@@ -1,6 +1,6 @@
 //! OpenEXR heightmaps: one channel of one part, f16, f32 or u32; NaN and infinities are no data.
 //!
-//! The channel is the first there is of `Y`, `Z`, `height`, `H`, `R`, or the only one. Blocks are decoded one
+//! The channel is the one asked for, else the first there is of `Y`, `Z`, `height`, `H`, `R`, or the only one. Blocks are decoded one
 //! after another, so that only the wanted channel is held.
 
 use std::collections::HashSet;
@@ -14,13 +14,14 @@ use exr::meta::header::Header;
 use half::f16;
 
 use super::held::{Held, Scale, Values, bare_description, check_claim, size};
-use super::{Cursor, HeightSource, ReadAt};
+use super::open::Input;
+use super::{Band, Cursor, HeightSource, OpenOptions, ReadAt};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Size};
 
 /// Reads the heights of the picture `name`.
-pub(super) fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Held> {
-    open_channel(name, bytes, &Wanted::HEIGHTS)
+pub(super) fn open(input: &Input) -> Result<Held> {
+    open_channel(input.name, input.bytes.clone(), &Wanted::HEIGHTS, input.options)
 }
 
 /// What is looked for in a picture.
@@ -41,7 +42,7 @@ impl Wanted {
         names: &["Y", "Z", "height", "H", "R"],
         only: true,
         what: "heights",
-        advice: "give one channel, or one named Y, Z, height, H or R",
+        advice: "name one of them with --band",
     };
 }
 
@@ -50,7 +51,7 @@ impl Wanted {
 /// # Errors
 /// Where the file is damaged, or has no such channel.
 pub(crate) fn read_channel(name: &str, bytes: Arc<dyn ReadAt>, wanted: &Wanted) -> Result<(Size, Vec<f64>)> {
-    let held = open_channel(name, bytes, wanted)?;
+    let held = open_channel(name, bytes, wanted, &OpenOptions::default())?;
     let Grid { size, base_m, .. } = held.description().grid;
     let mut values = vec![0.0; size.samples() as usize];
     held.read(size.rect(), &mut values)?;
@@ -58,7 +59,7 @@ pub(crate) fn read_channel(name: &str, bytes: Arc<dyn ReadAt>, wanted: &Wanted) 
 }
 
 /// As if it were of heights.
-fn open_channel(name: &str, bytes: Arc<dyn ReadAt>, wanted: &Wanted) -> Result<Held> {
+fn open_channel(name: &str, bytes: Arc<dyn ReadAt>, wanted: &Wanted, options: &OpenOptions) -> Result<Held> {
     let file_bytes = bytes.size_bytes();
     let failed = |error: exr::error::Error| refused(name, error);
     let reader = exr::block::read(BufReader::new(Cursor::new(bytes)), false).map_err(failed)?;
@@ -70,15 +71,24 @@ fn open_channel(name: &str, bytes: Arc<dyn ReadAt>, wanted: &Wanted) -> Result<H
         check_claim(name, width, height, pixel_bytes.max(1), file_bytes)?;
         check_claim(name, header.chunk_count as u64, 1, 1, file_bytes)?;
     }
-    let (layer, channel) = choose(headers, wanted).ok_or_else(|| {
+    let (layer, channel) = choose(headers, wanted, options.band.as_ref()).ok_or_else(|| {
         let names: Vec<String> = headers
             .iter()
             .flat_map(|h| &h.channels.list)
             .take(8)
             .map(|c| c.name.to_string())
             .collect();
-        let what = format!("has no channel of {} among {}", wanted.what, names.join(", "));
-        Error::new(ErrorKind::Unsupported, name, what).advice(wanted.advice)
+        let names = names.join(", ");
+        let misuse =
+            |what: String| Error::new(ErrorKind::Misuse, name, what).advice("name one of them with --band");
+        match &options.band {
+            Some(Band::Name(band)) => misuse(format!("has no channel named {band:?} among {names}")),
+            Some(Band::Number(n)) => misuse(format!("has no channel {n} among {names}")),
+            None => {
+                let what = format!("has no channel of {} among {names}", wanted.what);
+                Error::new(ErrorKind::Unsupported, name, what).advice(wanted.advice)
+            }
+        }
     })?;
     let header = &headers[layer];
     let description = &header.channels.list[channel];
@@ -101,7 +111,7 @@ fn open_channel(name: &str, bytes: Arc<dyn ReadAt>, wanted: &Wanted) -> Result<H
     let sample_type = description.sample_type;
     let (width, height) = (header.layer_size.x(), header.layer_size.y());
     let mut assumed = Vec::new();
-    if headers.len() > 1 || header.channels.list.len() > 1 {
+    if options.band.is_none() && (headers.len() > 1 || header.channels.list.len() > 1) {
         let part = header
             .own_attributes
             .layer_name
@@ -144,18 +154,24 @@ fn open_channel(name: &str, bytes: Arc<dyn ReadAt>, wanted: &Wanted) -> Result<H
                 return Err(Error::new(ErrorKind::Broken, name, what));
             }
             let start = z * width + x;
+            // A no-data value is compared in the type of the samples.
+            let nodata = options.nodata;
+            let void_of = |void: bool, value: f64| if void { f64::NAN } else { value };
             match sample_type {
                 SampleType::F16 => set(name, &mut values, start, line.value, |b| {
-                    f16::from_ne_bytes(b).to_f64()
+                    let v = f16::from_ne_bytes(b);
+                    void_of(nodata.is_some_and(|n| f16::from_f64(n) == v), v.to_f64())
                 })?,
                 SampleType::F32 => {
                     set(name, &mut values, start, line.value, |b| {
-                        f64::from(f32::from_ne_bytes(b))
+                        let v = f32::from_ne_bytes(b);
+                        void_of(nodata.is_some_and(|n| n as f32 == v), v.into())
                     })?;
                 }
                 SampleType::U32 => {
                     set(name, &mut values, start, line.value, |b| {
-                        f64::from(u32::from_ne_bytes(b))
+                        let v = f64::from(u32::from_ne_bytes(b));
+                        void_of(nodata == Some(v), v)
                     })?;
                 }
             }
@@ -184,8 +200,9 @@ fn open_channel(name: &str, bytes: Arc<dyn ReadAt>, wanted: &Wanted) -> Result<H
     Held::new(description, heights.heights)
 }
 
-/// Part and channel that hold what is wanted.
-fn choose(headers: &[Header], wanted: &Wanted) -> Option<(usize, usize)> {
+/// Part and channel that hold what is wanted: the ones asked for, of the first part that has such a channel; numbers count
+/// the channels of all parts.
+fn choose(headers: &[Header], wanted: &Wanted, band: Option<&Band>) -> Option<(usize, usize)> {
     let find = |name: &str| {
         headers.iter().enumerate().find_map(|(layer, header)| {
             let channel = header.channels.list.iter().position(|c| c.name.eq(name))?;
@@ -196,7 +213,17 @@ fn choose(headers: &[Header], wanted: &Wanted) -> Option<(usize, usize)> {
         let [header] = headers else { return None };
         (wanted.only && header.channels.list.len() == 1).then_some((0, 0))
     };
-    wanted.names.iter().copied().find_map(find).or_else(only)
+    let all = || {
+        let channels = headers.iter().enumerate();
+        channels
+            .flat_map(|(layer, header)| (0..header.channels.list.len()).map(move |channel| (layer, channel)))
+    };
+    match band {
+        None => wanted.names.iter().copied().find_map(find).or_else(only),
+        // A channel of a layer within a part is named `layer.channel`.
+        Some(Band::Name(name)) => find(name),
+        Some(Band::Number(n)) => all().nth((*n as usize).checked_sub(1)?),
+    }
 }
 
 fn set<const N: usize>(
@@ -240,6 +267,7 @@ fn refused(name: &str, error: exr::error::Error) -> Error {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{HeightSource, OpenOptions};
     use super::*;
     use crate::error::Result;
     use exr::prelude::*;
@@ -270,7 +298,11 @@ mod tests {
     }
 
     fn read(bytes: Vec<u8>) -> Result<(super::super::Description, Vec<f32>)> {
-        let held = open("t.exr", Arc::new(bytes))?;
+        read_with(bytes, &OpenOptions::default())
+    }
+
+    fn read_with(bytes: Vec<u8>, options: &OpenOptions) -> Result<(super::super::Description, Vec<f32>)> {
+        let held = open(&Input::bare("t.exr", bytes, options))?;
         let mut out = vec![0.0; held.description().grid.size.samples() as usize];
         held.read(held.description().grid.size.rect(), &mut out)?;
         Ok((held.description().clone(), out))
@@ -333,6 +365,32 @@ mod tests {
             "{:?}",
             d.assumed
         );
+    }
+
+    #[test]
+    fn any_channel_is_read_by_its_name_or_number() {
+        let flat = |v: f32| FlatSamples::F32(vec![v, -5.0]);
+        let bytes = encode(
+            vec![("A", flat(1.0)), ("depth.Z", flat(2.0)), ("Y", flat(3.0))],
+            (2, 1),
+            Compression::ZIP1,
+        );
+        let of = |band: Option<Band>, nodata| {
+            let options = OpenOptions {
+                band,
+                nodata,
+                ..OpenOptions::default()
+            };
+            read_with(bytes.clone(), &options).map(|(_, heights)| heights)
+        };
+        assert_eq!(of(None, None).unwrap(), [3.0, -5.0]);
+        assert_eq!(of(Some(Band::Name("depth.Z".into())), None).unwrap(), [2.0, -5.0]);
+        assert_eq!(of(Some(Band::Number(1)), None).unwrap(), [1.0, -5.0]);
+        assert!(of(None, Some(-5.0)).unwrap()[1].is_nan());
+        for band in [Band::Name("Z".into()), Band::Number(0), Band::Number(4)] {
+            let error = of(Some(band), None).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::Misuse, "{error}");
+        }
     }
 
     #[test]

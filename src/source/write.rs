@@ -8,7 +8,7 @@ use tiff::encoder::{TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard, TiffVa
 use tiff::tags::Tag;
 
 use super::held::filled;
-use super::{Description, HeightSource, Registration};
+use super::{Description, Georeference, HeightSource, Registration};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
 use crate::progress::Progress;
@@ -122,9 +122,7 @@ impl Tags {
         // The tie point names the first sample; where pixels are areas, that is the middle of the first pixel.
         let at = if area { 0.5 } else { 0.0 };
         let crs = place.and_then(|p| p.crs.clone());
-        let code = crs
-            .as_deref()
-            .and_then(|crs| crs.strip_prefix("EPSG:")?.parse::<u16>().ok());
+        let [code, vertical] = place.map_or([None; 2], Georeference::epsg);
 
         // Key, tag that holds it (0: the value itself), count, value; in rising order of keys.
         let mut keys = vec![
@@ -158,8 +156,14 @@ impl Tags {
                 .find(|(_, length_m): &(u16, f64)| (metres / length_m - 1.0).abs() < 1e-9);
             keys.extend(unit.map(|(unit, _)| [3076, 0, 1, unit]));
         }
+        // Heights are metres by now, whatever they were read as; a system of heights in another unit is left out.
+        keys.extend(
+            vertical
+                .filter(|_| description.vertical_unit == "metre")
+                .map(|v| [4096, 0, 1, v]),
+        );
         if description.vertical_unit != "unknown" {
-            keys.push([4099, 0, 1, 9001]); // heights are metres by now, whatever they were read as
+            keys.push([4099, 0, 1, 9001]);
         }
         let mut directory = vec![[1, 1, 0, keys.len() as u16]];
         directory.extend(keys);
@@ -187,7 +191,7 @@ fn failed(error: TiffError) -> Error {
 #[cfg(test)]
 mod tests {
     use super::super::held::{Held, bare_description};
-    use super::super::{Georeference, Synth, open_bytes};
+    use super::super::{OpenOptions, Synth, open_bytes};
     use super::*;
     use crate::grid::Size;
     use crate::progress::Silent;
@@ -197,7 +201,7 @@ mod tests {
     fn round_trip(source: &dyn HeightSource) -> (Description, Vec<f32>) {
         let mut out = Cursor::new(Vec::new());
         write_tiff(&mut out, source, &Silent).unwrap();
-        let back = open_bytes("back.tif", Arc::new(out.into_inner())).unwrap();
+        let back = open_bytes("back.tif", Arc::new(out.into_inner()), &OpenOptions::default()).unwrap();
         (back.description().clone(), all(back.as_ref()))
     }
 
@@ -237,6 +241,7 @@ mod tests {
     fn places_voids_and_bases_come_back() {
         for (registration, geographic, crs) in [
             (Registration::Area, false, Some("EPSG:32633")),
+            (Registration::Area, false, Some("EPSG:32633+5703")),
             (Registration::Point, true, Some("EPSG:4326")),
             (Registration::Point, false, Some("a grid of our own")),
         ] {
@@ -255,6 +260,9 @@ mod tests {
                 geographic,
             };
             description.place = Some(place.clone());
+            if place.epsg()[1].is_some() {
+                description.vertical_unit = "metre".into();
+            }
             description.grid.base_m = if geographic { 10_000_000.125 } else { 0.0 };
             let heights = vec![0.0, f32::NAN, -3.5, 4.0, 5.25, 1e4];
             let (d, back) = round_trip(&Held::new(description.clone(), heights.clone()).unwrap());

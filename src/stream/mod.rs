@@ -13,7 +13,7 @@ use crate::levels::{Arrival, Bounds, Levels, LightSample};
 use crate::light::Sun;
 use crate::progress::Progress;
 use crate::pyramid::Filter;
-use crate::source::{self, Description, HeightSource, ReadAt, Synth};
+use crate::source::{self, Description, Georeference, HeightSource, OpenOptions, ReadAt, Synth};
 use crate::terrain::{Meta, TerrainFile, is_terrain};
 
 /// A terrain, shared by any number of views.
@@ -47,12 +47,40 @@ impl Terrain {
     /// # Errors
     /// Where the input is missing, damaged, of a kind that is not read, or too large to be held.
     pub fn open(input: impl AsRef<Path>, progress: &dyn Progress) -> Result<Self> {
-        let path = input.as_ref();
-        if let Some(synth) = path.to_str().and_then(Synth::parse) {
-            return Ok(Self::from_synth(synth?));
+        Self::open_with(&[input], &OpenOptions::default(), progress)
+    }
+
+    /// Opens `inputs`, several files or folders of one DEM among them (see [`source::open_with`]), read as `options`
+    /// say. What only a look at the samples tells is warned of.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`]; [`crate::ErrorKind::Misuse`] where options do not suit the input: a terrain file takes
+    /// none.
+    pub fn open_with(
+        inputs: &[impl AsRef<Path>],
+        options: &OpenOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        if let [input] = inputs {
+            let path = input.as_ref();
+            if options.is_default()
+                && let Some(synth) = path.to_str().and_then(Synth::parse)
+            {
+                return Ok(Self::from_synth(synth?));
+            }
+            if path.is_file() {
+                let (name, bytes) = (path.display().to_string(), source::open_file(path)?);
+                if is_terrain(bytes.as_ref()) {
+                    options.refuse_for_terrain(&name)?;
+                    return Self::from_bytes(&name, bytes, progress);
+                }
+            }
         }
-        let bytes = source::open_file(path)?;
-        Self::from_bytes(&path.display().to_string(), bytes, progress)
+        let source = source::open_with(inputs, options)?;
+        for remark in source.remarks(progress)? {
+            progress.warn(&format!("{}: {remark}", source.description().name));
+        }
+        Self::from_source(source.as_ref(), progress)
     }
 
     /// The terrain in `bytes`: a terrain file's or a DEM file's. `name` is how messages speak of it, and its
@@ -70,7 +98,10 @@ impl Terrain {
                 origin,
             });
         }
-        Self::from_source(source::open_bytes(name, bytes)?.as_ref(), progress)
+        Self::from_source(
+            source::open_bytes(name, bytes, &OpenOptions::default())?.as_ref(),
+            progress,
+        )
     }
 
     /// The terrain of a DEM that the caller reads: its pyramid is built in memory.
@@ -105,6 +136,14 @@ impl Terrain {
     /// What it was made from.
     pub fn origin(&self) -> &Origin {
         &self.origin
+    }
+
+    /// Where it lies, if its file says.
+    pub fn place(&self) -> Option<&Georeference> {
+        match &self.origin {
+            Origin::File(meta) => meta.place.as_ref(),
+            Origin::Dem(description) => description.place.as_ref(),
+        }
     }
 
     /// The sun whose light was traced, where there is light.

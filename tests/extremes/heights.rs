@@ -282,7 +282,9 @@ fn infinite_heights_of_a_file_are_counted() {
     let description = clipscape::source::HeightSource::description(&synth).clone();
     let mut file = std::io::Cursor::new(Vec::new());
     clipscape::source::write_tiff(&mut file, &Unruly(description), &Silent).unwrap();
-    let source = clipscape::source::open_bytes("unruly.tif", Arc::new(file.into_inner())).unwrap();
+    let source =
+        clipscape::source::open_bytes("unruly.tif", Arc::new(file.into_inner()), &Default::default())
+            .unwrap();
     let assumed = &source.description().assumed;
     assert!(
         assumed.iter().any(|s| s.starts_with("3 heights are infinite")),

@@ -103,12 +103,13 @@ fn what_is_wrong_is_named_in_one_line() {
 }
 
 #[test]
-fn a_flight_over_the_map_is_refused_as_not_supported() {
+fn a_flight_over_the_map_is_none_in_world_metres() {
     let json = r#"{"frame": "crs", "keys": [{"t": 0, "at": [1.5, 42.5], "above_m": 300, "heading": 0, "pitch": 0}]}"#;
     assert_eq!(
         Flight::parse("f.json", json).unwrap_err().kind(),
-        ErrorKind::Unsupported
+        ErrorKind::Misuse
     );
+    assert!(is_crs(json) && crate::camera::CrsFlight::parse("f.json", json).is_ok());
     let world = json.replace("crs", "world");
     assert_eq!(
         Flight::parse("f.json", &world).unwrap_err().kind(),

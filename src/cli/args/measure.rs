@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::InputArgs;
 use crate::cli::view_values::{List, Promise};
 use crate::cli::{values, view_values};
 use crate::light::Sun;
@@ -16,8 +17,8 @@ use crate::pyramid::FilterKind;
 /// transitions, levels and filters one at a time.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct MeasureArgs {
-    /// A terrain file, a DEM, or synth:SIZE[:SEED]
-    pub(in crate::cli) input: PathBuf,
+    #[command(flatten)]
+    pub(in crate::cli) input: InputArgs,
 
     /// The path: a flight's JSON file
     #[arg(long, value_name = "FILE")]

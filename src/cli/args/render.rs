@@ -5,17 +5,19 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::InputArgs;
 use crate::cli::values;
 use crate::cli::view_values::{self, ClipSize};
 use crate::clipmap::Wait;
 use crate::light::Sun;
 use crate::shade::ViewMode;
 
-/// Draw pictures of a DEM or terrain file: one that shows the whole, one from a given place, or a flight.
+/// Draw pictures of a DEM or terrain file: one that shows the whole, one from a given place, or a flight. Of a DEM the
+/// pyramid is built on the way, and no light traced.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct RenderArgs {
-    /// A terrain file, a DEM (its pyramid is built on the way, no light traced), or synth:SIZE[:SEED]
-    pub(in crate::cli) input: PathBuf,
+    #[command(flatten)]
+    pub(in crate::cli) input: InputArgs,
 
     /// The picture, or the folder of a flight's frames [default: STEM.png, or STEM for a flight]
     #[arg(long, short, value_name = "PATH")]
@@ -23,26 +25,42 @@ pub(in crate::cli) struct RenderArgs {
 
     /// Where the camera stands: world metres, x east, y up, z south of the north-western sample
     #[arg(long, value_name = "X,Y,Z", value_parser = view_values::place, allow_hyphen_values = true)]
-    #[arg(conflicts_with = "flight")]
+    #[arg(conflicts_with = "flight", group = "camera")]
     pub(in crate::cli) eye: Option<[f64; 3]>,
+
+    /// Where the camera stands in the DEM's own reference system: easting and northing, or longitude and latitude in
+    /// degrees, --above its ground
+    #[arg(long, value_name = "E,N", value_parser = view_values::crs_place, allow_hyphen_values = true)]
+    #[arg(conflicts_with = "flight", group = "camera")]
+    pub(in crate::cli) eye_at: Option<[f64; 2]>,
+
+    /// Metres of the camera above the ground [default: 2]
+    #[arg(long, value_name = "METRES", value_parser = values::number, allow_negative_numbers = true)]
+    #[arg(requires = "eye_at")]
+    pub(in crate::cli) above: Option<f64>,
+
+    /// What it looks at, instead of heading and pitch: the ground there, as for --eye-at
+    #[arg(long, value_name = "E,N", value_parser = view_values::crs_place, allow_hyphen_values = true)]
+    #[arg(requires = "camera", conflicts_with_all = ["heading", "pitch"])]
+    pub(in crate::cli) look_at: Option<[f64; 2]>,
 
     /// Where it looks: degrees clockwise from north [default: 0]
     #[arg(long, value_name = "DEGREES", value_parser = values::number, allow_negative_numbers = true)]
-    #[arg(requires = "eye")]
+    #[arg(requires = "camera")]
     pub(in crate::cli) heading: Option<f64>,
 
     /// Degrees upwards, -90 to 90 [default: 0]
     #[arg(long, value_name = "DEGREES", value_parser = view_values::pitch, allow_negative_numbers = true)]
-    #[arg(requires = "eye")]
+    #[arg(requires = "camera")]
     pub(in crate::cli) pitch: Option<f64>,
 
     /// Degrees by which the right side is tilted down [default: 0]
     #[arg(long, value_name = "DEGREES", value_parser = values::number, allow_negative_numbers = true)]
-    #[arg(requires = "eye")]
+    #[arg(requires = "camera")]
     pub(in crate::cli) roll: Option<f64>,
 
     /// Vertical field of view in degrees, 0.01 to below 180 [default: 60]
-    #[arg(long, value_name = "DEGREES", value_parser = view_values::fov, requires = "eye", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES", value_parser = view_values::fov, requires = "camera", allow_negative_numbers = true)]
     pub(in crate::cli) fov: Option<f64>,
 
     /// Draw the frames of a flight: a JSON file, or orbit to circle the DEM once
@@ -179,6 +197,11 @@ mod tests {
             (args.view.clip_size, args.view.max_error_px),
             (Some(ClipSize::Auto), Some(0.5))
         );
+        let args = parse("render a.tif --eye-at 1.5,-42 --above 300 --look-at 2,-43 --roll 3").unwrap();
+        assert_eq!(
+            (args.eye_at, args.above, args.look_at),
+            (Some([1.5, -42.0]), Some(300.0), Some([2.0, -43.0]))
+        );
         let args = parse("render a.exr --flight orbit --frames 0..3 --view level").unwrap();
         assert_eq!((args.frames, args.view.view), (Some(0..3), ViewMode::Level));
         assert!(!args.measure && parse("render a.exr --measure --stats b").unwrap().measure);
@@ -187,6 +210,12 @@ mod tests {
             "render a.tif --measure",
             "render a.tif --pitch 3",
             "render a.tif --eye 0,0,0 --flight orbit",
+            "render a.tif --eye-at 0,0 --flight orbit",
+            "render a.tif --eye-at 0,0 --eye 0,0,0",
+            "render a.tif --eye-at 0,0,0",
+            "render a.tif --above 3",
+            "render a.tif --look-at 3,4",
+            "render a.tif --eye-at 0,0 --look-at 3,4 --pitch 3",
             "render a.tif --msaa 2",
             "render a.tif --levels 0",
             "render a.tif --eye 0,nan,0",

@@ -80,22 +80,16 @@ pub(super) fn shown(text: &str) -> String {
     text.chars().take(40).collect()
 }
 
+/// A number, whose decimal point may be a comma.
 pub(super) fn number(name: &str, word: &Word) -> Result<f64> {
-    if let Ok(value) = word.text.parse() {
-        return Ok(value);
-    }
-    let text = shown(&word.text);
-    let comma = text.contains(',') && text.replace(',', ".").parse::<f64>().is_ok();
-    let (kind, why, advice) = if comma {
-        (
-            ErrorKind::Unsupported,
-            "has a decimal comma",
-            "replace the commas by points",
-        )
-    } else {
-        (ErrorKind::Broken, "is not a number", "")
-    };
-    Err(Error::new(kind, name, format!("line {}: {text:?} {why}", word.line)).advice(advice))
+    let parsed = word
+        .text
+        .parse()
+        .or_else(|_| word.text.replacen(',', ".", 1).parse());
+    parsed.map_err(|_| {
+        let what = format!("line {}: {:?} is not a number", word.line, shown(&word.text));
+        Error::new(ErrorKind::Broken, name, what)
+    })
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,7 +148,7 @@ impl Header {
             };
             let Some(key) = key(&word.text) else {
                 // `nan` and `inf` may be the first height; any other letter begins a word not known here.
-                if word.text.starts_with(|c: char| c.is_alphabetic()) && word.text.parse::<f64>().is_err() {
+                if word.text.starts_with(char::is_alphabetic) && word.text.parse::<f64>().is_err() {
                     return broken(
                         word.line,
                         format!("{:?} is no word of an ESRI ASCII header", shown(&word.text)),

@@ -1,6 +1,6 @@
 //! Scale, offset and unit of heights from `GDAL_METADATA`, a small XML text.
 
-/// What the text says of the first band.
+/// What the text says of a band.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Items {
     /// Heights are `value * scale + offset`.
@@ -12,7 +12,9 @@ pub(super) struct Items {
 }
 
 /// Reads `<Item name="SCALE" sample="0" role="scale">0.1</Item>` and its like; all else is passed over.
-pub(super) fn read(xml: &str) -> Items {
+/// Bands are counted from 0.
+pub(super) fn read(xml: &str, band: u32) -> Items {
+    let sample = band.to_string();
     let mut items = Items {
         scale: 1.0,
         offset: 0.0,
@@ -29,7 +31,7 @@ pub(super) fn read(xml: &str) -> Items {
             let (_, after) = attributes.split_once(&format!("{key}=\""))?;
             after.split('"').next()
         };
-        if attribute("sample") != Some("0") {
+        if attribute("sample") != Some(sample.as_str()) {
             continue;
         }
         let number = || value.trim().parse::<f64>().ok().filter(|n| n.is_finite());
@@ -47,11 +49,9 @@ pub(super) fn read(xml: &str) -> Items {
 /// Name and length in metres of a unit that GDAL writes by name.
 pub(super) fn linear_unit(name: &str) -> Option<(&'static str, f64)> {
     match name.to_ascii_lowercase().as_str() {
-        "m" | "metre" | "meter" | "metres" | "meters" => super::place::linear_unit(9001),
-        "ft" | "foot" | "feet" => super::place::linear_unit(9002),
-        "us survey foot" | "us_survey_foot" | "us-ft" | "sfoot" | "foot_us" => {
-            super::place::linear_unit(9003)
-        }
+        "m" | "metre" | "meter" | "metres" | "meters" => super::keys::linear_unit(9001),
+        "ft" | "foot" | "feet" => super::keys::linear_unit(9002),
+        "us survey foot" | "us_survey_foot" | "us-ft" | "sfoot" | "foot_us" => super::keys::linear_unit(9003),
         _ => None,
     }
 }
@@ -61,20 +61,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scale_offset_and_unit_of_the_first_band_are_found() {
+    fn scale_offset_and_unit_of_a_band_are_found() {
         let xml = "<GDALMetadata>\n <Item name=\"AREA\">x</Item>\n\
                    <Item name=\"OFFSET\" sample=\"0\" role=\"offset\">-100</Item>\n\
                    <Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.25</Item>\n\
                    <Item name=\"SCALE\" sample=\"1\" role=\"scale\">7</Item>\n\
                    <Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">ft</Item>\n</GDALMetadata>";
         assert_eq!(
-            read(xml),
+            read(xml, 0),
             Items {
                 scale: 0.25,
                 offset: -100.0,
                 unit: Some("ft".into())
             }
         );
+        assert_eq!((read(xml, 1).scale, read(xml, 1).unit), (7.0, None));
         let none = Items {
             scale: 1.0,
             offset: 0.0,
@@ -86,7 +87,7 @@ mod tests {
             "<Item sample=\"0\" role=\"scale\">",
             "<Item sample=\"0\" role=\"scale\">x</Item>",
         ] {
-            assert_eq!(read(odd), none, "{odd}");
+            assert_eq!(read(odd, 0), none, "{odd}");
         }
         assert_eq!(linear_unit("FT"), Some(("foot", 0.3048)));
         assert_eq!(linear_unit("furlong"), None);

@@ -1,0 +1,19 @@
+//! Shares the decoding of a file's blocks out to all processors.
+
+use rayon::prelude::*;
+
+use crate::work::Work;
+
+/// Runs tasks on rayon's threads: those of the pool that the caller works on, else those of the process.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Processors;
+
+impl Work for Processors {
+    fn each(&self, count: usize, task: &(dyn Fn(usize) + Sync)) {
+        if count < 2 {
+            (0..count).for_each(task);
+        } else {
+            (0..count).into_par_iter().for_each(task);
+        }
+    }
+}
