@@ -231,7 +231,7 @@ impl Words<'_> {
 
     /// Goes on to where the next record begins, or the end of the file.
     fn skip_to_record(&mut self) -> Result<()> {
-        while self.at % RECORD_BYTES != 0 {
+        while !self.at.is_multiple_of(RECORD_BYTES) {
             match self.take() {
                 Ok(Some(_)) => {}
                 Ok(None) => break,
