@@ -88,6 +88,8 @@ pub(super) fn open(input: &Input) -> Result<Held> {
             geographic::spacing_m(&place, size).map_err(|what| Error::new(ErrorKind::Broken, name, what))?;
         spacing_m = metres;
         assumed.push(sentence);
+    } else {
+        assumed.push(geographic::GRID_NORTH_ASSUMED.into());
     }
     if outside > 0 {
         assumed.push(format!(
