@@ -3,6 +3,7 @@
 //!
 //! `cargo run --example heights -- OUT INPUT... [--band N|NAME]`; prints columns, rows, the base height and the type of
 //! samples.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program's own output")]
 
 use std::fs::File;
 use std::io::{BufWriter, Write};

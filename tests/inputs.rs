@@ -1,5 +1,6 @@
 //! What a user may name as a DEM and say of it: mosaics, folders, archives, crops, bands, bare samples.
 #![cfg(all(feature = "cli", feature = "dem"))]
+#![allow(clippy::print_stderr, reason = "what is skipped is said")]
 
 use std::fs;
 use std::io::Write;

@@ -164,12 +164,10 @@ mod tests {
     fn dem(place: Option<Georeference>) -> Box<dyn HeightSource> {
         let size = Size { width: 5, height: 4 };
         let mut description = bare_description("t", "test", "uint8", size);
-        if let Some(place) = &place {
-            if place.geographic {
-                let (spacing_m, sentence) = geographic::spacing_m(place, size).unwrap();
-                description.grid.spacing_m = spacing_m;
-                description.assumed = vec![sentence];
-            }
+        if let Some(place) = place.as_ref().filter(|p| p.geographic) {
+            let (spacing_m, sentence) = geographic::spacing_m(place, size).unwrap();
+            description.grid.spacing_m = spacing_m;
+            description.assumed = vec![sentence];
         }
         description.place = place;
         let heights = size.rect().cells().map(|(x, z)| (10 * x + z) as f32).collect();

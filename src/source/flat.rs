@@ -168,7 +168,7 @@ impl HeightSource for Flat {
         }
         let mut infinite = 0;
         self.look_through(progress, |_, v| {
-            infinite += u64::from(v.is_infinite() || (v as f32).is_infinite())
+            infinite += u64::from(v.is_infinite() || (v as f32).is_infinite());
         })?;
         Ok(super::held::infinite_sentence(infinite).into_iter().collect())
     }

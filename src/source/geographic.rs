@@ -141,7 +141,6 @@ pub(super) fn looks_like_degrees(place: &Georeference, size: Size) -> bool {
 pub(super) const DEGREES_ASSUMED: &str =
     "The coordinate reference system is unknown; from its extent and cell size it is taken to be in degrees.";
 
-#[cfg(feature = "dem")]
 /// What `assumed` says of a projected grid, whose columns point to grid north.
 pub(super) const GRID_NORTH_ASSUMED: &str = "Grid north is taken for true north.";
 

@@ -19,6 +19,7 @@ mod mosaic;
 mod open;
 mod openexr;
 mod options;
+mod paths;
 #[cfg(feature = "dem")]
 mod png;
 #[cfg(feature = "dem")]
@@ -33,9 +34,10 @@ mod usgs_dem;
 mod write;
 
 pub use georeference::{Georeference, Registration};
-pub use open::{files_of, name_of, open, open_bytes, open_file, open_with};
+pub use open::open_bytes;
 pub(crate) use openexr::{Wanted, read_channel};
 pub use options::{Band, Crop, OpenOptions, RawLayout, SampleType};
+pub use paths::{files_of, name_of, open, open_file, open_with};
 pub use read_at::{Cursor, ReadAt};
 pub use synth::{MAX_SYNTH_SIZE, Synth};
 #[cfg(feature = "dem")]

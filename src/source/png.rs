@@ -1,4 +1,5 @@
-//! PNG heightmaps: 8 or 16 bits a sample, without any place on the earth; grey, or a band of several that is named.
+//! PNG heightmaps: 8 or 16 bits a sample, without any place on the earth; grey, or a band of several that is named. A
+//! grey that the file declares transparent is no data.
 
 use std::io::BufReader;
 
@@ -63,7 +64,12 @@ pub(super) fn open(input: &Input) -> Result<Held> {
     });
     let mut reader = decoder.read_info().map_err(failed)?;
 
-    let nodata = input.options.nodata;
+    // A grey that is declared transparent is no data, in 16 bits whatever the depth (PNG specification, section 11.3.2.1).
+    let transparent = match reader.info().trns.as_deref() {
+        Some([high, low]) if bands == 1 => Some(f64::from(u16::from_be_bytes([*high, *low]))),
+        _ => None,
+    };
+    let nodata = input.options.nodata.or(transparent);
     let mut values = Values::new(name, count)?;
     let mut put_row = |z: usize, row: &[u8]| {
         for (x, pixel) in row.chunks_exact(pixel_bytes).take(width as usize).enumerate() {
@@ -168,6 +174,28 @@ mod tests {
         assert!(d.assumed.iter().any(|s| s.contains("1 m")));
         let (_, heights) = read(encode(&[0, 7, 255], 1, 3, ColorType::Grayscale, BitDepth::Eight)).unwrap();
         assert_eq!(heights, [0.0, 7.0, 255.0]);
+    }
+
+    #[test]
+    fn a_transparent_grey_is_no_data() {
+        for (depth, pixels) in [
+            (BitDepth::Sixteen, vec![0, 7, 1, 0, 0, 7]),
+            (BitDepth::Eight, vec![7, 100, 7]),
+        ] {
+            let mut out = Vec::new();
+            let mut encoder = Encoder::new(&mut out, 3, 1);
+            encoder.set_color(ColorType::Grayscale);
+            encoder.set_depth(depth);
+            encoder.set_trns(vec![0, 7]);
+            let mut writer = encoder.write_header().unwrap();
+            writer.write_image_data(&pixels).unwrap();
+            writer.finish().unwrap();
+            let (_, heights) = read(out).unwrap();
+            assert!(
+                heights[0].is_nan() && heights[2].is_nan() && heights[1] >= 100.0,
+                "{heights:?}"
+            );
+        }
     }
 
     #[test]

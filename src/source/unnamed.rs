@@ -64,6 +64,7 @@ pub(super) fn locate_in(
         located.assumed.push(sentence);
     } else if let Some(metres) = system.as_ref().and_then(|s| s.metres) {
         located.spacing_m = pixel.map(|p| p * metres);
+        located.assumed.push(geographic::GRID_NORTH_ASSUMED.into());
     } else {
         located.assumed.push(geographic::METRES_ASSUMED.into());
     }

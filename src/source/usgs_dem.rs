@@ -88,6 +88,8 @@ pub(super) fn open(input: &Input) -> Result<Held> {
             geographic::spacing_m(&place, size).map_err(|what| Error::new(ErrorKind::Broken, name, what))?;
         spacing_m = metres;
         assumed.push(sentence);
+    } else {
+        assumed.push(geographic::GRID_NORTH_ASSUMED.into());
     }
     if outside > 0 {
         assumed.push(format!(
@@ -231,7 +233,7 @@ impl Words<'_> {
 
     /// Goes on to where the next record begins, or the end of the file.
     fn skip_to_record(&mut self) -> Result<()> {
-        while self.at % RECORD_BYTES != 0 {
+        while !self.at.is_multiple_of(RECORD_BYTES) {
             match self.take() {
                 Ok(Some(_)) => {}
                 Ok(None) => break,

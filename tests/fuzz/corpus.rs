@@ -6,15 +6,15 @@ use std::path::Path;
 use clipscape::source::{OpenOptions, RawLayout, SampleType};
 
 /// A format and its files.
-pub struct Format {
-    pub name: &'static str,
+pub(crate) struct Format {
+    pub(crate) name: &'static str,
     /// Names and bytes of files that are read.
-    pub files: Vec<(String, Vec<u8>)>,
+    pub(crate) files: Vec<(String, Vec<u8>)>,
     /// The same of files that are refused.
-    pub broken: Vec<(String, Vec<u8>)>,
-    pub options: OpenOptions,
+    pub(crate) broken: Vec<(String, Vec<u8>)>,
+    pub(crate) options: OpenOptions,
     /// What makes a file of damaged bytes: headers that stand beside are put into an archive with their samples.
-    pub pack: fn(Vec<u8>) -> Vec<u8>,
+    pub(crate) pack: fn(Vec<u8>) -> Vec<u8>,
 }
 
 fn format(name: &'static str, files: Vec<(&str, Vec<u8>)>, endings: &[&str]) -> Format {
@@ -42,7 +42,7 @@ fn format(name: &'static str, files: Vec<(&str, Vec<u8>)>, endings: &[&str]) -> 
     }
 }
 
-pub fn geotiff() -> Format {
+pub(crate) fn geotiff() -> Format {
     use tiff::encoder::colortype::{Gray16, Gray32Float, GrayI16};
     use tiff::encoder::{Compression, DeflateLevel, TiffEncoder};
     use tiff::tags::{Predictor, Tag};
@@ -87,7 +87,7 @@ pub fn geotiff() -> Format {
     format("geotiff", files, &[".tif"])
 }
 
-pub fn png() -> Format {
+pub(crate) fn png() -> Format {
     let encode = |depth: png::BitDepth| {
         let mut out = Vec::new();
         let mut encoder = png::Encoder::new(&mut out, 23, 11);
@@ -132,7 +132,7 @@ fn mend_checksums(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-pub fn openexr() -> Format {
+pub(crate) fn openexr() -> Format {
     use exr::prelude::*;
     let encode = |compression, blocks, half: bool| {
         let ramp: Vec<f32> = (0..21 * 13).map(|i| (i * i % 97) as f32).collect();
@@ -173,7 +173,7 @@ pub fn openexr() -> Format {
 }
 
 /// A tile has no header and one of three lengths: it comes packed.
-pub fn hgt() -> Format {
+pub(crate) fn hgt() -> Format {
     let tile = vec![0u8; 2 * 1201 * 1201];
     format(
         "hgt",
@@ -182,7 +182,7 @@ pub fn hgt() -> Format {
     )
 }
 
-pub fn dted() -> Format {
+pub(crate) fn dted() -> Format {
     let (width, height) = (5u16, 7u16);
     let mut bytes = format!("UHL10800000W0430000N03000300{:19}{width:04}{height:04}", "").into_bytes();
     for (text, length) in [("", 80), ("DSI", 728), ("ACC", 3428)] {
@@ -199,7 +199,7 @@ pub fn dted() -> Format {
     format("dted", vec![("a.dt0", bytes)], &[".dt0"])
 }
 
-pub fn usgs_dem() -> Format {
+pub(crate) fn usgs_dem() -> Format {
     // The broken one is whole as far as its first profile.
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/data/invalid"));
     let cut = std::fs::read(folder.join("dem-profiles-missing.dem")).expect("a file");
@@ -218,7 +218,7 @@ pub fn usgs_dem() -> Format {
 const GRID: &str = "ncols 3\nnrows 2\nxllcorner 7.5\nyllcorner 46\ncellsize 0.01\nNODATA_value -9999\n\
                     1 2.5 -9999\n4e2 5 -6,5\n";
 
-pub fn ascii_grid() -> Format {
+pub(crate) fn ascii_grid() -> Format {
     let centre = GRID
         .replace("corner", "center")
         .replace("cellsize 0.01", "dx 30\ndy 20")
@@ -243,7 +243,7 @@ fn pack_with_header(bytes: Vec<u8>) -> Vec<u8> {
     zipped(&[("a.hdr", header), ("a.bil", samples)], false)
 }
 
-pub fn bil() -> Format {
+pub(crate) fn bil() -> Format {
     let header = "NROWS 4\nNCOLS 5\nNBITS 16\nPIXELTYPE SIGNEDINT\nBYTEORDER M\nLAYOUT BIL\nSKIPBYTES 2\nNBANDS 1\n\
                   BANDROWBYTES 10\nTOTALROWBYTES 12\nULXMAP 7\nULYMAP 46\nXDIM 0.01\nYDIM 0.01\nNODATA -9999\n";
     let float = "ncols 3\nnrows 3\ncellsize 30\nxllcorner 5e5\nyllcorner 4e6\nnodata_value -9999\nnbits 64\n\
@@ -261,7 +261,7 @@ pub fn bil() -> Format {
     }
 }
 
-pub fn envi() -> Format {
+pub(crate) fn envi() -> Format {
     let header = "ENVI\nsamples = 5\nlines = 4\nbands = 1\nheader offset = 2\ndata type = 4\ninterleave = bsq\n\
                   byte order = 0\ndata ignore value = 0\nmap info = {UTM, 1, 1, 440720, 3751320, 60, 60, 11, North, \
                   units=Meters}\ncoordinate system string = {PROJCS[\"a\",UNIT[\"Meter\",1.0]]}\n";
@@ -272,7 +272,7 @@ pub fn envi() -> Format {
     }
 }
 
-pub fn raw() -> Format {
+pub(crate) fn raw() -> Format {
     let options = OpenOptions {
         raw: Some(RawLayout {
             width: 6,
@@ -291,7 +291,7 @@ pub fn raw() -> Format {
     }
 }
 
-pub fn zip() -> Format {
+pub(crate) fn zip() -> Format {
     let samples = vec![9u8; 4 * 3000];
     let header = "NROWS 30\nNCOLS 100\nNBITS 32\nPIXELTYPE FLOAT\nBYTEORDER I\n";
     let files = vec![
@@ -308,7 +308,7 @@ pub fn zip() -> Format {
     format("zip", files, &[".zip"])
 }
 
-pub fn gzip() -> Format {
+pub(crate) fn gzip() -> Format {
     let mut writer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     writer.write_all(GRID.as_bytes()).unwrap();
     format("gzip", vec![("a.asc.gz", writer.finish().unwrap())], &[".gz"])

@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 
 use clipscape::grid::{Rect, Size};
 use clipscape::progress::Silent;
-use clipscape::source::{HeightSource, OpenOptions, open_bytes};
+use clipscape::source::{OpenOptions, open_bytes};
 
 use corpus::Format;
 use mutate::{Random, mutate};

@@ -48,10 +48,11 @@ impl Tile {
             // A difference of steps adds up along a side.
             let drift = (step / common - 1.0).abs() * sides[axis] as f64;
             let shift = (place.origin[axis] - other.origin[axis]) / common;
-            if !(drift <= OFF_GRID_STEPS) {
+            if drift.is_nan() || drift > OFF_GRID_STEPS {
                 return off(format!("has a step of {step}, other tiles have {common}"));
             }
-            if !((shift - shift.round()).abs() <= OFF_GRID_STEPS && shift.abs() < MAX_SIZE as f64) {
+            let on_grid = (shift - shift.round()).abs() <= OFF_GRID_STEPS && shift.abs() < MAX_SIZE as f64;
+            if !on_grid {
                 return off(format!(
                     "lies {shift:.3} steps from {}, not a whole number",
                     first.name
