@@ -9,6 +9,7 @@ use clipscape::levels::Levels;
 use clipscape::progress::Silent;
 use clipscape::pyramid::{Filter, Pyramid};
 use clipscape::query::{S0, Surface};
+use clipscape::source::{Crop, OpenOptions};
 use clipscape::stream::Terrain;
 use glam::DVec3;
 
@@ -28,6 +29,14 @@ pub fn count(variable: &str, default: usize) -> usize {
     asked.unwrap_or(default)
 }
 
+/// A part of the Sierra Nevada around Mt Whitney, in degrees.
+const SIERRA: Crop = Crop::Place {
+    west: -119.0,
+    north: 37.25,
+    east: -118.0,
+    south: 36.25,
+};
+
 /// White noise, the shipped DEM, and of those for development the ones that are there.
 pub fn dems() -> Vec<Dem> {
     let mut dems = vec![Dem {
@@ -36,15 +45,28 @@ pub fn dems() -> Vec<Dem> {
         real: false,
     }];
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    for (name, path) in [
-        ("Pyrenees", "data/N42E001.hgt"),
-        ("Mt Hood", "../shared/data/small/lf_elev_220_mt_hood_utm.tif"),
+    for (name, path, crop) in [
+        ("Pyrenees", "data/N42E001.hgt", None),
+        (
+            "Mt Hood",
+            "../shared/data/small/lf_elev_220_mt_hood_utm.tif",
+            None,
+        ),
+        (
+            "Sierra, 119 to 118 W, 36.25 to 37.25 N",
+            "../shared/data/sierra",
+            Some(SIERRA),
+        ),
     ] {
         let path = root.join(path);
-        if path.exists() && (cfg!(feature = "dem") || path.extension().is_some_and(|e| e == "hgt")) {
+        if path.exists() && (cfg!(feature = "dem") || path.starts_with(root.join("data"))) {
+            let options = OpenOptions {
+                crop,
+                ..Default::default()
+            };
             dems.push(Dem {
                 name,
-                levels: Box::new(Terrain::open(path, &Silent).unwrap()),
+                levels: Box::new(Terrain::open_with(&[path], &options, &Silent).unwrap()),
                 real: true,
             });
         }

@@ -6,10 +6,13 @@ use std::sync::Arc;
 /// A decoded block; none where the file leaves it out.
 pub(super) type Block = Option<Arc<Vec<u8>>>;
 
+/// A decoded block, and when it was last used.
+type Held = (Arc<Vec<u8>>, u64);
+
 /// The cache of an image.
 #[derive(Debug)]
 pub(super) struct Cache {
-    blocks: HashMap<(i64, i64), (Arc<Vec<u8>>, u64)>,
+    blocks: HashMap<(i64, i64), Held>,
     bytes: usize,
     budget_bytes: usize,
     clock: u64,
