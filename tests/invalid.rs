@@ -19,7 +19,7 @@ const CASES: &[(&str, ErrorKind, &str)] = &[
     ("tif-no-width.tif", Broken, ""),
     ("tif-no-strip-offsets.tif", Broken, ""),
     ("tif-zero-width.tif", Broken, ""),
-    ("tif-huge.tif", Limit, "536870912 x 536870912"),
+    ("tif-huge.tif", Limit, "claims"),
     ("tif-beyond-2-30-a-side.tif", Limit, "3221225472"),
     ("tif-strip-beyond-end.tif", Broken, ""),
     ("tif-deflate-damaged.tif", Broken, ""),

@@ -14,7 +14,6 @@ The exit status is 1 if any sample differs, a message has several lines, or a li
 """
 
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -42,46 +41,39 @@ def binary():
     return os.path.join(target, "release", "examples", "heights")
 
 
+# A process's greatest memory counts that of the one it was forked from: a small one forks, and prints status and bytes.
+RUNNER = """
+import resource, subprocess, sys
+address, seconds, program = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3:]
+limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (address, address))
+try:
+    status = subprocess.run(program, timeout=seconds, preexec_fn=limit).returncode
+except subprocess.TimeoutExpired:
+    status = "slow"
+print()
+print(status, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024)
+"""
+
+
 class Ran:
     """One run of the example: its heights, or why there are none; its greatest memory in bytes."""
 
     def __init__(self, program, inputs, band, address_bytes):
-        with tempfile.NamedTemporaryFile() as out, tempfile.TemporaryFile() as err, tempfile.TemporaryFile() as said:
+        with tempfile.NamedTemporaryFile() as out:
             arguments = [program, out.name, *inputs] + (["--band", str(band)] if band else [])
-            limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (address_bytes, address_bytes))
-            child = subprocess.Popen(arguments, stdout=said, stderr=err, preexec_fn=limit)
-            self.slow = not waits(child)
-            err.seek(0)
-            said.seek(0)
-            self.status, self.peak_bytes = child.returncode, child.peak_bytes
-            self.error = err.read().decode(errors="replace").rstrip("\n")
+            runner = [sys.executable, "-c", RUNNER, str(address_bytes), str(SECONDS)]
+            ran = subprocess.run(runner + arguments, capture_output=True, text=True, errors="replace", check=True)
+            *said, last = ran.stdout.strip().splitlines()
+            status, peak = last.split()
+            self.slow = status == "slow"
+            self.status = None if self.slow else int(status)
+            self.peak_bytes = int(peak)
+            self.error = ran.stderr.rstrip("\n")
             self.heights = None
             if self.status == 0:
-                width, height, base, _ = said.read().decode().split(" ", 3)
+                width, height, base, _ = said[0].split(" ", 3)
                 self.base = float(base)
                 self.heights = numpy.fromfile(out.name, dtype="<f8").reshape(int(height), int(width))
-
-
-def waits(child):
-    """Waits for the child, at most SECONDS; keeps its status and its greatest memory."""
-    import signal
-
-    def late(*_):
-        raise TimeoutError
-
-    signal.signal(signal.SIGALRM, late)
-    signal.alarm(SECONDS)
-    in_time = True
-    try:
-        _, status, usage = os.wait4(child.pid, 0)
-    except TimeoutError:
-        child.kill()
-        _, status, usage = os.wait4(child.pid, 0)
-        in_time = False
-    signal.alarm(0)
-    child.returncode = os.waitstatus_to_exitcode(status)
-    child.peak_bytes = usage.ru_maxrss * 1024
-    return in_time
 
 
 def gdal_open(inputs):

@@ -75,7 +75,8 @@ def make_tiffs():
     put("tif-no-width.tif", tiff(without=[256]))
     put("tif-no-strip-offsets.tif", tiff(without=[273]))
     put("tif-zero-width.tif", tiff([(256, (SHORT, [0]))]))
-    put("tif-huge.tif", tiff([(256, (LONG, [1 << 29])), (257, (LONG, [1 << 29])), (278, (LONG, [1 << 29]))]))
+    huge = [(256, (LONG, [1 << 29])), (257, (LONG, [1 << 29])), (278, (LONG, [1 << 29])), (259, (SHORT, [8]))]
+    put("tif-huge.tif", tiff(huge, data=zlib.compress(bytes(range(16)))))
     put("tif-beyond-2-30-a-side.tif", tiff([(256, (LONG, [3 << 30]))]))
     put("tif-strip-beyond-end.tif", tiff([(273, (LONG, [1 << 20]))]))
     put("tif-deflate-damaged.tif", tiff([(259, (SHORT, [8]))], data=b"\x78\x9c" + b"\xff" * 20))

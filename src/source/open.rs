@@ -75,7 +75,7 @@ pub(super) fn ending(name: &str) -> String {
 /// an SRTM tile's name is its place. Nothing lies beside it.
 ///
 /// # Errors
-/// As [`open_with`].
+/// As [`super::open_with`].
 pub fn open_bytes(
     name: &str,
     bytes: Arc<dyn ReadAt>,

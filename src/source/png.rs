@@ -64,9 +64,11 @@ pub(super) fn open(input: &Input) -> Result<Held> {
     });
     let mut reader = decoder.read_info().map_err(failed)?;
 
-    // A grey that is declared transparent is no data, in 16 bits whatever the depth (PNG specification, section 11.3.2.1).
-    let transparent = match reader.info().trns.as_deref() {
-        Some([high, low]) if bands == 1 => Some(f64::from(u16::from_be_bytes([*high, *low]))),
+    // A grey that is declared transparent is no data (PNG specification, section 11.3.2.1); the library gives as many
+    // bytes as a sample has.
+    let transparent = match (bands, reader.info().trns.as_deref()) {
+        (1, Some([high, low])) => Some(f64::from(u16::from_be_bytes([*high, *low]))),
+        (1, Some([grey])) => Some(f64::from(*grey)),
         _ => None,
     };
     let nodata = input.options.nodata.or(transparent);
