@@ -1,6 +1,7 @@
 //! Reads a DEM through windows from north to south, as preprocessing does, and says how fast: one line a file.
 //!
 //! `cargo run --release --example read_dem -- FILE [ROWS]`, with windows of ROWS rows (256).
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program's own output")]
 
 use std::path::Path;
 use std::time::Instant;
