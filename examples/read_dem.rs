@@ -1,30 +1,23 @@
 //! Reads a DEM through windows from north to south, as preprocessing does, and says how fast: one line a file.
 //!
-//! `cargo run --release --example read_dem -- FILE [ROWS [OUT [BAND]]]`, with windows of ROWS rows (256). OUT takes all
-//! heights in metres as f64, little-endian, row by row, NaN for no data.
+//! `cargo run --release --example read_dem -- FILE [ROWS]`, with windows of ROWS rows (256).
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program's own output")]
 
-use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::time::Instant;
 
 use clipscape::grid::Rect;
-use clipscape::source::{self, Band, HeightSource, OpenOptions};
+use clipscape::source::{self, HeightSource};
 
 fn main() -> std::process::ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let Some(file) = arguments.first() else {
-        eprintln!("usage: read_dem FILE [ROWS [OUT [BAND]]]");
+        eprintln!("usage: read_dem FILE [ROWS]");
         return 2.into();
     };
     let rows = arguments.get(1).and_then(|rows| rows.parse().ok());
-    let band = arguments.get(3).and_then(|band| band.parse().ok());
-    let options = OpenOptions {
-        band: band.map(Band::Number),
-        ..OpenOptions::default()
-    };
-    let read = source::open_file(Path::new(file)).and_then(|bytes| source::open_bytes(file, bytes, &options));
-    let read = read.map_err(|e| e.to_string());
-    let line = read.and_then(|source| pass(source.as_ref(), rows.unwrap_or(256), arguments.get(2)));
+    let read = source::open(Path::new(file)).map_err(|e| e.to_string());
+    let line = read.and_then(|source| pass(source.as_ref(), rows.unwrap_or(256)));
     match line {
         Ok(line) => println!("{line}"),
         Err(line) => {
@@ -36,17 +29,11 @@ fn main() -> std::process::ExitCode {
 }
 
 /// Reads all of `source`, `rows` rows at once.
-fn pass(source: &dyn HeightSource, rows: i64, out: Option<&String>) -> Result<String, String> {
+fn pass(source: &dyn HeightSource, rows: i64) -> Result<String, String> {
     let description = source.description();
     let (size, base_m) = (description.grid.size, description.grid.base_m);
     let rows = rows.clamp(1, size.height);
     let mut window = vec![0.0f32; (rows * size.width) as usize];
-    let mut out = match out {
-        Some(path) => Some(BufWriter::new(
-            std::fs::File::create(path).map_err(|e| format!("{path}: {e}"))?,
-        )),
-        None => None,
-    };
     let start = Instant::now();
     let mut voids = 0;
     for z in (0..size.height).step_by(rows as usize) {
@@ -54,11 +41,6 @@ fn pass(source: &dyn HeightSource, rows: i64, out: Option<&String>) -> Result<St
         let window = &mut window[..rect.area() as usize];
         source.read(rect, window).map_err(|e| e.to_string())?;
         voids += window.iter().filter(|h| h.is_nan()).count();
-        if let Some(out) = &mut out {
-            let heights = window.iter().map(|h| f64::from(*h) + base_m);
-            let bytes: Vec<u8> = heights.flat_map(f64::to_le_bytes).collect();
-            out.write_all(&bytes).map_err(|e| e.to_string())?;
-        }
     }
     let seconds = start.elapsed().as_secs_f64();
     let reads = source.reads();

@@ -6,13 +6,14 @@ use std::sync::Arc;
 /// A decoded block; none where the file leaves it out.
 pub(super) type Block = Option<Arc<Vec<u8>>>;
 
-/// A decoded block, and when it was last used.
-type Held = (Arc<Vec<u8>>, u64);
+/// Column and row of a block.
+type At = (i64, i64);
 
 /// The cache of an image.
 #[derive(Debug)]
 pub(super) struct Cache {
-    blocks: HashMap<(i64, i64), Held>,
+    /// Blocks, and when each was last used.
+    blocks: HashMap<At, (Arc<Vec<u8>>, u64)>,
     bytes: usize,
     budget_bytes: usize,
     clock: u64,
@@ -29,7 +30,7 @@ impl Cache {
     }
 
     /// The block at a column and row of blocks, if it is held.
-    pub(super) fn get(&mut self, at: (i64, i64)) -> Option<Arc<Vec<u8>>> {
+    pub(super) fn get(&mut self, at: At) -> Option<Arc<Vec<u8>>> {
         self.clock += 1;
         let (block, used) = self.blocks.get_mut(&at)?;
         *used = self.clock;
@@ -37,7 +38,7 @@ impl Cache {
     }
 
     /// Holds a block; drops those that were not used for the longest where it gets too many.
-    pub(super) fn put(&mut self, at: (i64, i64), block: Arc<Vec<u8>>) {
+    pub(super) fn put(&mut self, at: At, block: Arc<Vec<u8>>) {
         self.clock += 1;
         self.bytes += block.len();
         if let Some((old, _)) = self.blocks.insert(at, (block, self.clock)) {
@@ -47,8 +48,7 @@ impl Cache {
             return;
         }
         // A quarter at once, so that not every block pays for the search.
-        let mut ages: Vec<(u64, (i64, i64))> =
-            self.blocks.iter().map(|(at, (_, used))| (*used, *at)).collect();
+        let mut ages: Vec<(u64, At)> = self.blocks.iter().map(|(at, (_, used))| (*used, *at)).collect();
         ages.sort_unstable();
         for (_, at) in ages {
             if self.bytes <= self.budget_bytes / 4 * 3 {
