@@ -113,7 +113,7 @@ impl SettingLists {
     pub fn quick() -> Self {
         Self {
             clip_sizes: vec![128, 256, 512, 1024],
-            max_errors_px: vec![None, Some(1.0), Some(4.0), Some(16.0)],
+            max_errors_px: vec![None, Some(1.0), Some(8.0)],
             transitions: vec![1],
             levels: vec![3],
             filters: vec![FilterKind::Point, FilterKind::Bilinear, FilterKind::Lanczos3],

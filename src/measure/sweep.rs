@@ -32,9 +32,9 @@ pub struct Effort {
 impl Effort {
     /// For [`super::SettingLists::quick`].
     pub const QUICK: Self = Self {
-        stride: 8,
-        rounds: 3,
-        measured_frames: 5,
+        stride: 10,
+        rounds: 2,
+        measured_frames: 4,
     };
 
     /// For [`super::SettingLists::full`].

@@ -28,7 +28,7 @@ pub(in crate::cli) struct MeasureArgs {
     #[arg(long, short, value_name = "FOLDER")]
     pub(in crate::cli) output: PathBuf,
 
-    /// Fewer settings and frames, of 640x360 pixels: two minutes instead of an hour on a software driver
+    /// Fewer settings and frames, of 640x360 pixels: about two minutes instead of an hour on a software driver
     #[arg(long)]
     pub(in crate::cli) quick: bool,
 

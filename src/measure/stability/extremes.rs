@@ -23,7 +23,7 @@ struct Found {
 }
 
 impl Found {
-    /// Adds what `cameras` see of `levels`: drawn with culling, without, and by a clipmap made for each.
+    /// Adds what `cameras` see of `levels`: drawn with culling, without, and the last by a clipmap made for it.
     fn add(
         &mut self,
         gpu: &Gpu,
@@ -40,9 +40,10 @@ impl Found {
         };
         let drawn: Vec<Picture> = pictures(gpu, levels, &with(true), cameras)?;
         self.wrong += differing(&drawn, &pictures(gpu, levels, &with(false), cameras)?);
-        for (camera, picture) in cameras.iter().zip(&drawn) {
-            let fresh = pictures(gpu, levels, &with(true), std::slice::from_ref(camera))?;
-            self.wrong += differing(&fresh, std::slice::from_ref(picture));
+        let last = cameras.len() - 1;
+        let fresh = pictures(gpu, levels, &with(true), &cameras[last..])?;
+        self.wrong += differing(&fresh, &drawn[last..]);
+        for picture in &drawn {
             self.wrong += picture.1.iter().filter(|d| !(0.0..=1.0).contains(*d)).count();
             self.terrain += picture.1.iter().filter(|d| **d > 0.0).count();
         }
@@ -242,18 +243,20 @@ pub(super) fn parameters(gpu: &Gpu) -> Result<Comparison> {
 /// A thousandth of a sample a frame across a level's snap, a climb, a turn on the spot.
 pub(super) fn motion(gpu: &Gpu) -> Result<Comparison> {
     let levels = terrain()?;
-    let mut cameras = Vec::new();
+    let [mut creeping, mut climbing, mut turning] = [const { Vec::new() }; 3];
     for k in 0..6 {
         let creep = 159.998 + 0.001 * f64::from(k);
-        cameras.push(camera([creep * SPACING_M[0], 600.0, 1700.0], 40.0, -30.0));
+        creeping.push(camera([creep * SPACING_M[0], 600.0, 1700.0], 40.0, -30.0));
     }
     for k in 0..6 {
-        cameras.push(camera([1610.0, 500.0 * 1.6f64.powi(k), 1700.0], 40.0, -60.0));
+        climbing.push(camera([1610.0, 500.0 * 1.6f64.powi(k), 1700.0], 40.0, -60.0));
     }
     for k in 0..6 {
-        cameras.push(camera([1610.0, 600.0, 1700.0], 61.0 * f64::from(k), -15.0));
+        turning.push(camera([1610.0, 600.0, 1700.0], 61.0 * f64::from(k), -15.0));
     }
     let mut found = Found::default();
-    found.add(gpu, &levels, &options(true, true), &cameras)?;
+    for cameras in [creeping, climbing, turning] {
+        found.add(gpu, &levels, &options(true, true), &cameras)?;
+    }
     Ok(found.line("creeping across a snap by 1/1000 sample a frame, climbing, turning on the spot"))
 }
