@@ -17,6 +17,7 @@
 //! 9. A fragment is *shaded* in `shaders/shared/ground.wgsl`, by the view's function or the caller's own, with the
 //!    constants of [`shade`].
 //! 10. [`render`] makes headless frames of it: pictures, contact sheets, animations, statistics.
+//! 11. [`measure`] flies many settings and reports what each costs and how wrong it is.
 //!
 //! Underneath all: [`grid`] is the only index arithmetic, [`error::Error`] the only error, [`camera`] says what is
 //! seen. Each room knows those above it in this file and none below.
@@ -62,6 +63,9 @@ pub mod gpu;
 
 #[cfg(feature = "gpu")]
 pub mod render;
+
+#[cfg(feature = "gpu")]
+pub mod measure;
 
 #[cfg(feature = "cli")]
 pub mod cli;

@@ -96,6 +96,10 @@ fn a_wrong_usage_is_status_2_and_one_line() {
         (&["preprocess", "a.tif", "--sun", "10,100"], "-90 to 90"),
         (&["preprocess", "a.tif", "--memory", "lots"], "512M"),
         (
+            &["preprocess", "a.tif", "--filter", "lanczos"],
+            "did you mean lanczos3?",
+        ),
+        (
             &["preprocess", "a.tif", "--sky-directions", "-1"],
             "--sky-directions",
         ),

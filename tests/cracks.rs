@@ -22,67 +22,19 @@ use clipscape::build::Threads;
 use clipscape::camera::{Camera, View};
 use clipscape::clipmap::{Clipmap, ClipmapOptions, Drawn, Wait};
 use clipscape::gpu::{ClipmapRenderer, Gpu, RendererOptions};
-use clipscape::grid::Grid;
 use clipscape::levels::Levels;
 use clipscape::light::Sun;
 use clipscape::progress::Silent;
-use clipscape::pyramid::{Filter, Pyramid};
 use clipscape::query::{S0, Surface};
 use clipscape::render::{Headless, HeadlessOptions};
 use clipscape::shade::ViewMode;
 use clipscape::stream::Terrain;
 use glam::DVec3;
-use support::{Random, gpu, hash, seed};
+use support::scenes::{self, camera, white_noise};
+use support::{Random, gpu, seed};
 
 fn cameras() -> u32 {
-    std::env::var("CLIPSCAPE_CAMERAS")
-        .ok()
-        .and_then(|n| n.parse().ok())
-        .unwrap_or(50)
-}
-
-/// White noise: each sample uniform in 0 to 9000 m; with voids, a tenth of it in blocks and some alone.
-fn white_noise(voids: bool) -> Pyramid {
-    let grid = Grid::new(1013, 1200, [30.0, 20.0]);
-    let heights = grid.size.rect().cells().map(|(i, j)| {
-        if voids && (hash(3, i / 13, j / 11) < 0.1 || hash(4, i, j) < 0.01) {
-            f32::NAN
-        } else {
-            (9000.0 * hash(0, i, j)) as f32
-        }
-    });
-    let threads = Threads::new(0).unwrap();
-    let mut pyramid = Pyramid::new(
-        grid,
-        heights.collect(),
-        None,
-        &Filter::default(),
-        &threads,
-        &Silent,
-    )
-    .unwrap();
-    pyramid.bound(&threads, &Silent).unwrap();
-    pyramid
-}
-
-fn camera(random: &mut Random, truth: &S0<'_>) -> Camera {
-    let grid = truth.grid();
-    let side = |axis: usize, samples: i64| grid.spacing_m[axis] * (samples - 1) as f64;
-    let x = random.uniform(-0.05, 1.05) * side(0, grid.size.width);
-    let z = random.uniform(-0.05, 1.05) * side(1, grid.size.height);
-    let ground = truth.height_at(x, z).unwrap().unwrap_or(0.0);
-    let above = if random.uniform(0.0, 1.0) < 0.3 {
-        random.uniform(-50.0, 50.0)
-    } else {
-        50.0 * random.uniform(0.0, 6.0).exp()
-    };
-    Camera {
-        eye: DVec3::new(x, ground + above, z),
-        heading_deg: random.uniform(0.0, 360.0),
-        pitch_deg: random.uniform(-90.0, 10.0),
-        roll_deg: random.uniform(-180.0, 180.0) * random.pick(&[0.0, 0.0, 0.0, 1.0]),
-        fov_deg: random.uniform(20.0, 100.0),
-    }
+    scenes::count("CLIPSCAPE_CAMERAS", 50) as u32
 }
 
 fn options(random: &mut Random) -> ClipmapOptions {

@@ -11,7 +11,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Rect, Size};
 use crate::light::{LightOptions, light_levels, sky_share, sun_share};
 use crate::progress::Progress;
-use crate::pyramid::{DEFAULT_LOBES, Filter, MAX_LOBES, Pyramid};
+use crate::pyramid::{Filter, Pyramid};
 use crate::source::{Description, HeightSource};
 use crate::terrain::layout::Layout;
 use crate::terrain::{self, LightMeta, Meta, SourceStamp};
@@ -24,8 +24,8 @@ const BAND_ROWS: i64 = 256;
 pub struct PreprocessOptions {
     /// The light to trace; none leaves it out of the file.
     pub light: Option<LightOptions>,
-    /// Lobes a side of the filter, 1 to [`MAX_LOBES`].
-    pub lobes: u32,
+    /// The filter that makes the levels above 0.
+    pub filter: Filter,
     /// Whether to replace a target that exists.
     pub force: bool,
     /// A DEM that needs more memory than this is refused.
@@ -40,7 +40,7 @@ impl Default for PreprocessOptions {
     fn default() -> Self {
         Self {
             light: Some(LightOptions::default()),
-            lobes: DEFAULT_LOBES,
+            filter: Filter::default(),
             force: false,
             memory_bytes: DEFAULT_MEMORY_BYTES,
             threads: 0,
@@ -102,7 +102,6 @@ pub fn preprocess(
         _ => options.source.clone(),
     };
     refuse_own_input(&stamp.name, out)?;
-    let filter = filter_of(options.lobes)?;
     if let Some(light) = &options.light {
         light.sun.check()?;
     }
@@ -131,7 +130,7 @@ pub fn preprocess(
             description.grid,
             heights,
             description.step_m,
-            &filter,
+            &options.filter,
             &threads,
             progress,
         )?;
@@ -144,11 +143,11 @@ pub fn preprocess(
             let sun = sun_share(heights, grid, light.sun, &threads, progress)?;
             report.sun_s = clock.lap();
             let sky = sky_share(heights, grid, light.sky_directions, &threads, progress)?;
-            let levels = light_levels(grid, heights, sun, sky, &filter, &threads, progress)?;
+            let levels = light_levels(grid, heights, sun, sky, &options.filter, &threads, progress)?;
             pyramid.set_light(levels)?;
             report.sky_s = clock.lap();
         }
-        let meta = describe(description, &pyramid, &filter, options, stamp);
+        let meta = describe(description, &pyramid, options, stamp);
         let buffered = BufWriter::with_capacity(1 << 20, &file);
         terrain::write(buffered, &meta, &pyramid, &threads, progress).map_err(|e| {
             if e.subject() == "terrain file" {
@@ -174,11 +173,10 @@ pub fn preprocess(
 /// Reads `source` whole and builds its pyramid with bounds, without light: what rendering a raw DEM needs.
 ///
 /// # Errors
-/// [`ErrorKind::Misuse`] where there cannot be as many lobes; [`ErrorKind::Limit`] where it needs more than
-/// [`DEFAULT_MEMORY_BYTES`]; [`ErrorKind::Cancelled`]; and what reading meets.
-pub fn build_pyramid(source: &dyn HeightSource, lobes: u32, progress: &dyn Progress) -> Result<Pyramid> {
+/// [`ErrorKind::Limit`] where it needs more than [`DEFAULT_MEMORY_BYTES`]; [`ErrorKind::Cancelled`]; and what reading
+/// meets.
+pub fn build_pyramid(source: &dyn HeightSource, filter: &Filter, progress: &dyn Progress) -> Result<Pyramid> {
     let description = source.description();
-    let filter = filter_of(lobes)?;
     memory::check(&description.name, &description.grid, false, DEFAULT_MEMORY_BYTES)?;
     let threads = Threads::new(0)?;
     let heights = read(source, progress)?;
@@ -186,7 +184,7 @@ pub fn build_pyramid(source: &dyn HeightSource, lobes: u32, progress: &dyn Progr
         description.grid,
         heights,
         description.step_m,
-        &filter,
+        filter,
         &threads,
         progress,
     )?;
@@ -216,14 +214,6 @@ impl Clock {
     fn total(&self) -> f64 {
         self.start.elapsed().as_secs_f64()
     }
-}
-
-fn filter_of(lobes: u32) -> Result<Filter> {
-    if (1..=MAX_LOBES).contains(&lobes) {
-        return Ok(Filter::sinc_blackman(lobes));
-    }
-    let what = format!("{lobes} lobes a side were asked for, 1 to {MAX_LOBES} are possible");
-    Err(Error::new(ErrorKind::Misuse, "filter", what))
 }
 
 /// Replacing a DEM by what was made of it would lose it.
@@ -293,7 +283,6 @@ fn rounding_m(description: &Description, heights: &[f32]) -> f64 {
 fn describe(
     description: &Description,
     pyramid: &Pyramid,
-    filter: &Filter,
     options: &PreprocessOptions,
     source: SourceStamp,
 ) -> Meta {
@@ -301,8 +290,8 @@ fn describe(
         grid: description.grid,
         place: description.place.clone(),
         vertical_unit: description.vertical_unit.clone(),
-        filter: filter.name().into(),
-        lobes: filter.lobes(),
+        filter: options.filter.kind().name().into(),
+        lobes: options.filter.lobes(),
         rounding_step_m: pyramid.rounding_step_m(),
         light: options.light.map(|light| LightMeta {
             sun_azimuth_deg: light.sun.azimuth_deg,

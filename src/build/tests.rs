@@ -12,7 +12,7 @@ use crate::levels::Levels;
 use crate::light::{LightOptions, trace_light};
 use crate::progress::{Progress, Silent};
 use crate::pyramid::random::Random;
-use crate::pyramid::{DEFAULT_LOBES, Filter};
+use crate::pyramid::{DEFAULT_LOBES, Filter, FilterKind};
 use crate::source::{Description, HeightSource};
 use crate::terrain::TerrainFile;
 use crate::terrain::testing::all_bits;
@@ -97,9 +97,9 @@ fn a_file_holds_what_the_pyramid_holds() {
             let report = preprocess(&hills, &out, &options, &Silent).unwrap();
             assert_eq!(entries(folder.path()), 1);
 
-            let mut pyramid = build_pyramid(&hills, DEFAULT_LOBES, &Silent).unwrap();
+            let mut pyramid = build_pyramid(&hills, &Filter::default(), &Silent).unwrap();
             if let Some(light) = &light {
-                let (grid, filter) = (hills.description.grid, Filter::sinc_blackman(DEFAULT_LOBES));
+                let (grid, filter) = (hills.description.grid, Filter::default());
                 let heights = pyramid.level(0).to_vec();
                 let traced = trace_light(&grid, &heights, light, &filter, &Serial, &Silent).unwrap();
                 pyramid.set_light(traced).unwrap();
@@ -114,8 +114,8 @@ fn a_file_holds_what_the_pyramid_holds() {
             assert_eq!(meta.source, options.source);
             assert_eq!(meta.assumed, hills.description.assumed);
             assert_eq!(
-                (meta.lobes, meta.rounding_step_m),
-                (DEFAULT_LOBES, Some(1.0 / 64.0))
+                (meta.filter.as_str(), meta.lobes, meta.rounding_step_m),
+                ("sinc-blackman", DEFAULT_LOBES, Some(1.0 / 64.0))
             );
             assert_eq!(
                 meta.light.map(|l| l.sky_directions),
@@ -138,16 +138,33 @@ fn a_file_holds_what_the_pyramid_holds() {
 }
 
 #[test]
-fn one_thread_or_two_the_same_bytes() {
+fn one_thread_or_many_the_same_bytes_whatever_the_filter() {
     let hills = Hills::new(530, 300);
     let folder = tempfile::tempdir().unwrap();
-    let bytes = |threads| {
-        let out = folder.path().join(format!("{threads}.terrain.exr"));
-        preprocess(&hills, &out, &options(threads), &Silent).unwrap();
+    let bytes = |threads, filter: FilterKind, light| {
+        let out = folder.path().join(format!("{filter}-{threads}.terrain.exr"));
+        let options = PreprocessOptions {
+            filter: filter.into(),
+            light,
+            ..options(threads)
+        };
+        preprocess(&hills, &out, &options, &Silent).unwrap();
+        assert_eq!(open(&out).meta().filter, filter.name());
         fs::read(out).unwrap()
     };
-    let (one, two) = (bytes(1), bytes(2));
-    assert!(one == two);
+    let mut files = Vec::new();
+    for filter in FilterKind::ALL {
+        let light = (filter == FilterKind::default()).then(LightOptions::default);
+        let one = bytes(1, filter, light);
+        for threads in [2, 5] {
+            assert!(
+                one == bytes(threads, filter, light),
+                "{filter}, {threads} threads"
+            );
+        }
+        assert!(!files.contains(&one), "{filter} makes another's file");
+        files.push(one);
+    }
 }
 
 #[test]
@@ -244,12 +261,6 @@ fn errors_are_one_line_and_leave_nothing() {
         error.to_string().contains(&format!("need {needed} MiB")),
         "{error}"
     );
-    for lobes in [0, 33] {
-        assert_eq!(
-            error_of(&whole, &out, &PreprocessOptions { lobes, ..options(1) }).kind(),
-            ErrorKind::Misuse
-        );
-    }
     let mut light = LightOptions::default();
     light.sun.altitude_deg = 91.0;
     let nowhere = PreprocessOptions {
@@ -265,7 +276,7 @@ fn errors_are_one_line_and_leave_nothing() {
 fn a_full_disk_is_one_line() {
     let hills = Hills::new(64, 64);
     // Writing to /dev/full fails as a full disk does; the writer is the one that `preprocess` uses.
-    let pyramid = build_pyramid(&hills, DEFAULT_LOBES, &Silent).unwrap();
+    let pyramid = build_pyramid(&hills, &Filter::default(), &Silent).unwrap();
     let meta = crate::terrain::testing::meta(hills.description.grid, false);
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let error = crate::terrain::write(full, &meta, &pyramid, &Serial, &Silent).unwrap_err();

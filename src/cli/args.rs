@@ -1,6 +1,8 @@
 //! What may be typed: commands, their options, and the help of each.
 
 #[cfg(feature = "gpu")]
+mod measure;
+#[cfg(feature = "gpu")]
 mod render;
 
 use std::path::PathBuf;
@@ -8,9 +10,12 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 #[cfg(feature = "gpu")]
+pub(super) use self::measure::MeasureArgs;
+#[cfg(feature = "gpu")]
 pub(super) use self::render::{RenderArgs, ViewArgs};
 use super::values;
 use crate::light::{DEFAULT_SKY_DIRECTIONS, Sun};
+use crate::pyramid::FilterKind;
 
 /// A terrain geometry clipmap engine: from a DEM to frames, and how wrong they are.
 #[derive(Debug, Parser)]
@@ -32,6 +37,8 @@ pub(super) enum Command {
     Preprocess(PreprocessArgs),
     #[cfg(feature = "gpu")]
     Render(Box<RenderArgs>),
+    #[cfg(feature = "gpu")]
+    Measure(Box<MeasureArgs>),
     #[cfg(feature = "dem")]
     Synth(SynthArgs),
 }
@@ -77,6 +84,11 @@ pub(super) struct PreprocessArgs {
     #[arg(long, value_name = "N", default_value_t = DEFAULT_SKY_DIRECTIONS)]
     #[arg(value_parser = clap::value_parser!(u32).range(0..=3600), allow_negative_numbers = true)]
     pub(super) sky_directions: u32,
+
+    /// How coarser levels are made: point, box, bilinear, cubic, lanczos3, sinc-blackman or sinc-blackman-clamped
+    #[arg(long, value_name = "NAME", value_parser = values::filter(), default_value = FilterKind::default().name())]
+    #[arg(hide_possible_values = true)]
+    pub(super) filter: FilterKind,
 
     /// Refuse a DEM that needs more memory than this, as in 512M or 2GiB
     #[arg(long, value_name = "BYTES", value_parser = values::bytes)]

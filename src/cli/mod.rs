@@ -4,6 +4,10 @@
 mod args;
 mod info;
 mod input;
+#[cfg(feature = "gpu")]
+mod measure;
+#[cfg(feature = "gpu")]
+mod measure_depth;
 mod preprocess;
 mod progress;
 #[cfg(feature = "gpu")]
@@ -49,6 +53,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Preprocess(args) => preprocess::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "gpu")]
         Command::Render(args) => render::run(&args, &Terminal::new(args.quiet)),
+        #[cfg(feature = "gpu")]
+        Command::Measure(args) => measure::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "dem")]
         Command::Synth(args) => synth::run(&args, &Terminal::new(args.quiet)),
     })

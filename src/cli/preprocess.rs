@@ -30,6 +30,7 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
             sun: args.sun.unwrap_or_default(),
             sky_directions: args.sky_directions,
         }),
+        filter: args.filter.into(),
         force: args.force,
         memory_bytes: args.memory.unwrap_or(defaults.memory_bytes),
         source: input::stamp(&args.input),

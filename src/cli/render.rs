@@ -152,7 +152,7 @@ fn distinct(faults: impl Iterator<Item = Error>) -> Vec<String> {
 }
 
 /// The command line as one line, whatever its arguments are made of.
-fn command_line() -> String {
+pub(super) fn command_line() -> String {
     let arguments: Vec<_> = std::env::args_os()
         .map(|a| a.to_string_lossy().into_owned())
         .collect();
@@ -195,7 +195,7 @@ fn default_output(args: &RenderArgs) -> PathBuf {
     }
 }
 
-fn read_flight(path: &Path) -> Result<(String, String)> {
+pub(super) fn read_flight(path: &Path) -> Result<(String, String)> {
     let name = path.display().to_string();
     let json = fs::read_to_string(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::InvalidData => Error::new(ErrorKind::Broken, &name, "is no text, so no flight")
@@ -289,12 +289,12 @@ fn pooled_errors(headless: &Headless, frames: &[FrameStats]) -> Option<PooledErr
     })
 }
 
-fn checksum(bytes: &[u8]) -> String {
+pub(super) fn checksum(bytes: &[u8]) -> String {
     format!("crc32c:{:08x}", crc32c::crc32c(bytes))
 }
 
 /// The checksum of an input that is a file.
-fn file_checksum(path: &Path) -> Result<Option<String>> {
+pub(super) fn file_checksum(path: &Path) -> Result<Option<String>> {
     if path.to_str().is_some_and(|p| p.starts_with("synth:")) {
         return Ok(None);
     }

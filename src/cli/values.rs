@@ -1,6 +1,9 @@
 //! How numbers, suns and bytes are written. Each parser says what it wants.
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
 use crate::light::Sun;
+use crate::pyramid::FilterKind;
 
 /// A finite number.
 pub(super) fn number(text: &str) -> Result<f64, String> {
@@ -30,6 +33,11 @@ pub(super) fn sun(text: &str) -> Result<Sun, String> {
     sun.check()
         .map_err(|_| "the altitude is outside of -90 to 90 degrees".to_string())?;
     Ok(sun)
+}
+
+/// A filter by its name.
+pub(super) fn filter() -> impl TypedValueParser<Value = FilterKind> {
+    PossibleValuesParser::new(FilterKind::ALL.map(FilterKind::name)).try_map(|name| name.parse())
 }
 
 /// Bytes: `4096`, `512M`, `2GiB`. K, M, G and T, with or without iB, are powers of 1024; KB to TB of 1000.

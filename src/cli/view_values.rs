@@ -1,6 +1,7 @@
 //! How a camera, a picture's size and the way of showing terrain are written.
 
 use std::ops::Range;
+use std::str::FromStr;
 
 use super::values::{number, numbers};
 use crate::camera::MIN_FOV_DEG;
@@ -74,6 +75,36 @@ pub(super) fn view(text: &str) -> Result<ViewMode, String> {
         let names: Vec<&str> = ViewMode::NAMED.iter().map(|(name, _)| *name).collect();
         format!("not one of {}", names.join(", "))
     })
+}
+
+/// A promised error in pixels, or none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Promise(pub(super) Option<f64>);
+
+/// `off`, or a promised error in pixels.
+pub(super) fn promise(text: &str) -> Result<Promise, String> {
+    match text {
+        "off" => Ok(Promise(None)),
+        _ => number(text).map(|px| Promise(Some(px))),
+    }
+}
+
+/// Values with commas between them; nothing where `none` was typed.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct List<T>(pub(super) Vec<T>);
+
+/// `none`, or values with commas between them.
+pub(super) fn list_of<T: FromStr>(text: &str) -> Result<List<T>, String>
+where
+    T::Err: std::fmt::Display,
+{
+    if text == "none" {
+        return Ok(List(Vec::new()));
+    }
+    let values = text
+        .split(',')
+        .map(|word| word.trim().parse().map_err(|e: T::Err| e.to_string()));
+    values.collect::<Result<_, _>>().map(List)
 }
 
 /// Whether frames wait for their data.

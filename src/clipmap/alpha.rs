@@ -26,7 +26,8 @@
 //! of its points has `d_{l+1} < (R + MARGIN) / 2 + 8` (the climb at least halves from level to level, because the
 //! ground it is measured from never falls, see [`super::Clipmap`]). From `T <= N/4 - 10` and `R = N/2 - 2`:
 //! `R - T >= N/4 + 8`, and `R/2 + 8 = N/4 + 7`: a whole step to spare, so the ring of level `l + 1` is selected 0.
-//! For the held field, (c) rests on the order in which patches fade in, see [`super::HeldField`].
+//! For the held field, (c) rests on the order in which patches fade in, see [`super::HeldField`], and on the nesting of
+//! need, see [`super::need`]: children are drawn where a corner has both below 1, and each by itself makes its share 0.
 //!
 //! From (b) and (c): neighbours differ by one level at most, and what the finer morphs towards is what is drawn.
 
@@ -59,12 +60,22 @@ pub fn lerp(s: f32, t: f32, k: f32) -> f32 {
 
 /// The held field of `level` at its vertex (i, j); `parent_last` is the last patch of the next coarser level.
 pub fn held(field: &HeldField, parent_last: [i32; 2], level: u32, i: i32, j: i32) -> f32 {
+    between_corners(parent_last, i, j, |x, z| field.corner(level, x, z))
+}
+
+/// The fade's share of the held field, likewise.
+pub(super) fn faded(field: &HeldField, parent_last: [i32; 2], level: u32, i: i32, j: i32) -> f32 {
+    between_corners(parent_last, i, j, |x, z| field.faded(level, x, z))
+}
+
+/// Bilinear at vertex (i, j) between the corners of the next coarser level's patch that holds it.
+fn between_corners(parent_last: [i32; 2], i: i32, j: i32, at: impl Fn(i64, i64) -> f32) -> f32 {
     // A parent patch is 16 vertices wide; the last one also owns its far side.
     let x = (i >> 4).min(parent_last[0]);
     let z = (j >> 4).min(parent_last[1]);
     let u = (i - (x << 4)) as f32 * 0.0625;
     let v = (j - (z << 4)) as f32 * 0.0625;
-    let corner = |dx: i32, dz: i32| field.corner(level, i64::from(x + dx), i64::from(z + dz));
+    let corner = |dx: i32, dz: i32| at(i64::from(x + dx), i64::from(z + dz));
     lerp(
         lerp(corner(0, 0), corner(1, 0), u),
         lerp(corner(0, 1), corner(1, 1), u),

@@ -12,11 +12,11 @@
 
 use std::sync::OnceLock;
 
-use super::Clipmap;
 use super::eye::Eye;
 use super::selection::{Instance, Scene, hull};
 use super::vertex::displace;
-use crate::error::{Error, ErrorKind, Result};
+use super::{Clipmap, no_frame};
+use crate::error::Result;
 use crate::grid::{Grid, PATCH, Patch, Rect};
 
 /// Corners along a patch's side.
@@ -140,23 +140,8 @@ impl<'a> Drawn<'a> {
     /// # Errors
     /// [`ErrorKind::Misuse`] where it was never updated, or its last update failed.
     pub fn new(clipmap: &'a Clipmap) -> Result<Self> {
-        let Some(&eye) = clipmap.eye() else {
-            return Err(Error::new(
-                ErrorKind::Misuse,
-                "clipmap",
-                "there is no frame whose surface could be queried",
-            )
-            .advice("update it first"));
-        };
-        let scene = Scene {
-            grid: &clipmap.grid,
-            ring: &clipmap.ring,
-            eye: &eye,
-            windows: &clipmap.windows,
-            levels: &clipmap.level_constants,
-            held: &clipmap.held,
-            frustum: None,
-            vertical_scale: clipmap.vertical_scale,
+        let Some(scene) = clipmap.scene() else {
+            return Err(no_frame("whose surface could be queried"));
         };
         let (roots, coarsest) = (scene.roots(), clipmap.windows.len() as u32 - 1);
         let mut walk = Walk::default();
@@ -168,7 +153,7 @@ impl<'a> Drawn<'a> {
         }
         Ok(Self {
             clipmap,
-            eye,
+            eye: *scene.eye,
             roots,
             levels: (0..=coarsest).map(|l| Nodes::new(l, &walk.nodes)).collect(),
             corners: (0..walk.drawn).map(|_| OnceLock::new()).collect(),

@@ -1,8 +1,8 @@
 //! The ground under the eye, level by level, from which each level measures the camera's climb.
 //!
 //! `G_m` is `S_m` with every sample that is void or has not arrived replaced by the next coarser level's value there,
-//! on the coarsest level by the DEM's least height, and moved towards that value by as much as the held field holds
-//! level `m` back there: so data that arrive never move it at once. The ground for level `l` is the highest of `G_1` to `G_{l+1}` under
+//! on the coarsest level by the DEM's least height, and moved towards that value by as much as fade holds level `m`
+//! back there: so data that arrive never move it at once. The ground for level `l` is the highest of `G_1` to `G_{l+1}` under
 //! the eye (clamped to the DEM): it never falls from level to level, so the climb in steps at least halves, as fact
 //! (c) of [`super::alpha`] needs.
 
@@ -69,12 +69,12 @@ fn sample(ground: &Ground<'_>, m: usize, i: i64, j: i64) -> f64 {
         let at = |i, j| sample(ground, m + 1, i, j);
         (at(i >> 1, j >> 1) + at((i + 1) >> 1, (j + 1) >> 1)) / 2.0
     };
-    let back = if held.is_quiet() {
+    let back = if held.has_faded_in() {
         0.0
     } else {
         let parents = grid.patches(m as u32 + 1);
         let last = [parents.width as i32 - 1, parents.height as i32 - 1];
-        f64::from(alpha::held(held, last, m as u32, i as i32, j as i32))
+        f64::from(alpha::faded(held, last, m as u32, i as i32, j as i32))
     };
     match own {
         Some(own) if back == 0.0 => own,

@@ -1,8 +1,10 @@
-//! The held field: what keeps a level from being drawn finer than its data allow.
+//! The held field: what keeps a level from being drawn finer than its data allow, or than the promised error needs.
 //!
 //! Level `l` is held by values in 0 to 1 at the corners of the patches of level `l + 1`. They live in one small
 //! toroidal grid per level, which the shader and its twin read by index, so that all patches that touch a corner
-//! read the same bits. A corner's value is the greatest *fade* of the patches that touch it.
+//! read the same bits. A corner's value is the greater of two: the greatest *fade* of the patches that touch it, and,
+//! where an error is promised, the least of their *need* ([`super::need`]). Need has no memory: it is a function of the
+//! view and the patches' bounds.
 //!
 //! A patch's fade says how far the data of its children are from being shown:
 //! - It is at least `clamp(R + 2 - d, 0, 1)`, with `d` the distance in steps of level `l` from the eye to the nearest
@@ -20,6 +22,7 @@
 use super::constants::LEVEL_SLOTS;
 use super::eye::Eye;
 use super::missing::distance;
+use super::need::Dial;
 use super::window::Window;
 use crate::grid::{Grid, PATCH, Patch, Rect, slot};
 
@@ -37,7 +40,9 @@ pub struct HeldField {
     ordered: bool,
     fading: bool,
     quiet: bool,
+    dialled: bool,
     required: Vec<f32>,
+    needs: Vec<f32>,
 }
 
 #[derive(Clone, Debug)]
@@ -46,6 +51,8 @@ struct LevelField {
     patches: Rect,
     /// Fade by slot of patch.
     fades: Vec<f32>,
+    /// The greatest fade around it, by slot of corner.
+    faded: Vec<f32>,
     /// Value by slot of corner.
     corners: Vec<f32>,
     generation: u64,
@@ -80,6 +87,7 @@ impl HeldField {
         let level = LevelField {
             patches: Rect::EMPTY,
             fades: vec![0.0; (size * size) as usize],
+            faded: vec![0.0; (size * size) as usize],
             corners: vec![0.0; (size * size) as usize],
             generation: 0,
         };
@@ -89,7 +97,9 @@ impl HeldField {
             ordered: true,
             fading: true,
             quiet: true,
+            dialled: false,
             required: Vec::new(),
+            needs: Vec::new(),
         }
     }
 
@@ -111,6 +121,11 @@ impl HeldField {
     /// The value that holds `level` at corner (x, z) of the patches of the next coarser level.
     pub fn corner(&self, level: u32, x: i64, z: i64) -> f32 {
         self.levels[level as usize].corners[self.index(x, z)]
+    }
+
+    /// The fade's share of the value at a corner.
+    pub(super) fn faded(&self, level: u32, x: i64, z: i64) -> f32 {
+        self.levels[level as usize].faded[self.index(x, z)]
     }
 
     /// Sets a corner to a value in 0 to 1, until the next update.
@@ -138,6 +153,11 @@ impl HeldField {
 
     /// Whether no value is above 0.
     pub fn is_quiet(&self) -> bool {
+        self.quiet && !self.dialled
+    }
+
+    /// Whether no fade is above 0.
+    pub(super) fn has_faded_in(&self) -> bool {
         self.quiet
     }
 
@@ -171,6 +191,7 @@ impl HeldField {
             // What lies outside the windows now must not be met again when they come back.
             for level in &mut self.levels {
                 level.fades.fill(0.0);
+                level.faded.fill(0.0);
                 if level.corners.iter().any(|c| *c != 0.0) {
                     level.corners.fill(0.0);
                     level.generation += 1;
@@ -225,7 +246,33 @@ impl HeldField {
                 .cells()
                 .map(|(a, b)| fades[self.index(a, b)])
                 .fold(0.0, f32::max);
+            let index = self.index(x, z);
+            self.levels[level as usize].faded[index] = value;
             self.set_corner(level, x, z, value);
+        }
+    }
+
+    /// Adds to the fade, which is up to date, what the promised error needs.
+    pub(super) fn dial(&mut self, windows: &[Window], dial: &Dial<'_>) {
+        self.dialled = true;
+        for pair in windows.windows(2) {
+            let [window, coarser] = pair else { continue };
+            let level = window.level();
+            let patches = touched(window, dial.extent.grid);
+            self.needs.clear();
+            self.needs
+                .extend(patches.cells().map(|(a, b)| dial.need(coarser, a, b)));
+            let corners = Rect::new(patches.x0, patches.z0, patches.x1 + 1, patches.z1 + 1);
+            for (x, z) in corners.cells() {
+                let touching = Rect::new(x - 1, z - 1, x + 1, z + 1).intersection(patches);
+                let need = touching
+                    .cells()
+                    .map(|(a, b)| {
+                        self.needs[((b - patches.z0) * patches.width() + (a - patches.x0)) as usize]
+                    })
+                    .fold(1.0, f32::min);
+                self.set_corner(level, x, z, need.max(self.faded(level, x, z)));
+            }
         }
     }
 

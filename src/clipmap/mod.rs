@@ -6,22 +6,29 @@
 
 pub mod alpha;
 mod arrivals;
+mod certificate;
 mod constants;
 mod drawn;
+mod extent;
 mod eye;
 mod frustum;
 mod ground;
 mod held;
 mod identity;
 mod missing;
+mod need;
 mod options;
 mod plan;
 mod relief;
+mod screen;
 mod selection;
 mod vertex;
 mod window;
 
 pub use arrivals::Wait;
+pub use certificate::{
+    Certificate, CertifiedPatch, Terms, Uncertified, certified_patches, certify, certify_by,
+};
 pub use constants::{
     LEVEL_SLOTS, LIGHT_TEXEL_STEPS, LevelConstants, Ring, VOID_HEIGHT, ViewConstants, light_level, near_m,
     near_of_m,
@@ -30,9 +37,10 @@ pub use drawn::{CORNERS, Corners, Drawn, Place};
 pub use eye::Eye;
 pub use frustum::Frustum;
 pub use held::{FADE_S, HeldField};
-pub use options::{ClipmapOptions, MAX_VERTICAL_SCALE};
+pub use options::{ClipmapOptions, MAX_ERROR_PX, MAX_VERTICAL_SCALE};
 pub use plan::{HEIGHT_BYTES, LIGHT_BYTES, LevelPlan, UpdatePlan, exposed_bytes};
 pub(crate) use relief::light_texels;
+pub use screen::Screen;
 pub use selection::{CLOSER_TRIANGLES, Instance, PATCH_TRIANGLES, Scene, Selection, Side};
 pub use vertex::{Vertex, displace};
 pub use window::{LightTexel, PatchInfo, Window};
@@ -42,9 +50,11 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Grid;
 use crate::levels::{Arrival, Bounds, Levels};
 use arrivals::Arrivals;
+use extent::Extent;
 use ground::Ground;
 use held::{FadeReport, Moment};
 use identity::Identity;
+use need::Dial;
 use window::Scratch;
 
 /// What an update did.
@@ -82,6 +92,7 @@ pub struct Clipmap {
     ring: Ring,
     vertical_scale: f64,
     cull: bool,
+    max_error_px: Option<f64>,
     cut: bool,
     has_light: bool,
     range_m: [f32; 2],
@@ -94,6 +105,7 @@ pub struct Clipmap {
     plan: UpdatePlan,
     generation: u64,
     eye: Option<Eye>,
+    screen: Option<Screen>,
     view_constants: ViewConstants,
     level_constants: Vec<LevelConstants>,
     grounds: Vec<f64>,
@@ -122,6 +134,7 @@ impl Clipmap {
             ring,
             vertical_scale: options.vertical_scale,
             cull: options.cull,
+            max_error_px: options.max_error_px,
             cut: count < fitting,
             has_light: levels.has_light(),
             range_m: height_range(levels)?,
@@ -134,6 +147,7 @@ impl Clipmap {
             plan: UpdatePlan::new(count),
             generation: 0,
             eye: None,
+            screen: None,
             view_constants: bytemuck::Zeroable::zeroed(),
             level_constants: Vec::with_capacity(count as usize),
             grounds: Vec::with_capacity(count as usize),
@@ -193,6 +207,20 @@ impl Clipmap {
             let constants = LevelConstants::new(level as u32, coarser, &eye, &self.grid, &self.ring, climb_m);
             self.level_constants.push(constants);
         }
+        let screen = Screen::new(view, &self.grid);
+        if let Some(max_error_px) = self.max_error_px {
+            let extent = Extent {
+                grid: &self.grid,
+                eye: &eye,
+                vertical_scale: self.vertical_scale,
+            };
+            let dial = Dial {
+                extent,
+                screen: &screen,
+                max_error_px,
+            };
+            self.held.dial(&self.windows, &dial);
+        }
         let frustum = Frustum::new(view);
         self.selection.select(&Scene {
             grid: &self.grid,
@@ -205,6 +233,7 @@ impl Clipmap {
             vertical_scale: self.vertical_scale,
         });
         self.eye = Some(eye);
+        self.screen = Some(screen);
         // A level shows nothing, late or not, where the camera has climbed beyond its reach. That is judged from the
         // highest ground that there may be: the ground that its climb is measured from may itself be late.
         let over_all_m = eye.height_m - f64::from(self.range_m[1]);
@@ -332,6 +361,25 @@ impl Clipmap {
         &self.selection
     }
 
+    /// The promised error in pixels, where one is.
+    pub fn max_error_px(&self) -> Option<f64> {
+        self.max_error_px
+    }
+
+    /// The selection's scene of the last update, without a frustum; none before the first, and after one that failed.
+    fn scene(&self) -> Option<Scene<'_>> {
+        Some(Scene {
+            grid: &self.grid,
+            ring: &self.ring,
+            eye: self.eye.as_ref()?,
+            windows: &self.windows,
+            levels: &self.level_constants,
+            held: &self.held,
+            frustum: None,
+            vertical_scale: self.vertical_scale,
+        })
+    }
+
     /// The eye of the last update; none before the first, and after one that failed.
     pub fn eye(&self) -> Option<&Eye> {
         self.eye.as_ref()
@@ -351,6 +399,11 @@ impl Clipmap {
     pub fn report(&self) -> &UpdateReport {
         &self.report
     }
+}
+
+/// That a clipmap has no frame to speak of.
+fn no_frame(what: &str) -> Error {
+    Error::new(ErrorKind::Misuse, "clipmap", format!("there is no frame {what}")).advice("update it first")
 }
 
 /// The least and greatest height of a DEM, from the saturated bounds of its coarsest level, which are small.

@@ -1,4 +1,6 @@
-//! How a clipmap is laid out: clip size, levels, transition, vertical scale, culling, waiting.
+//! How a clipmap is laid out: clip size, levels, transition, vertical scale, culling, promised error, waiting.
+
+use std::ops::RangeInclusive;
 
 use super::arrivals::Wait;
 use super::constants::Ring;
@@ -6,6 +8,9 @@ use crate::error::{Error, ErrorKind, Result};
 
 /// The greatest factor on heights, either way: heights up to 1e30 m times it stay within f32.
 pub const MAX_VERTICAL_SCALE: f64 = 1e6;
+
+/// The errors in pixels that can be promised.
+pub const MAX_ERROR_PX: RangeInclusive<f64> = 1e-6..=1e6;
 
 /// How a clipmap is laid out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +25,8 @@ pub struct ClipmapOptions {
     pub vertical_scale: f64,
     /// Whether patches that are not seen are left out.
     pub cull: bool,
+    /// The promised error in pixels: detail that it does not need is left out; none draws all that the rings reach.
+    pub max_error_px: Option<f64>,
     /// Whether frames wait for their data.
     pub wait: Wait,
     /// The most bytes of samples that an update writes, beside the coarsest level; no limit where none. Only without
@@ -35,6 +42,7 @@ impl Default for ClipmapOptions {
             transition: None,
             vertical_scale: 1.0,
             cull: true,
+            max_error_px: None,
             wait: Wait::All,
             upload_budget_bytes: None,
         }
@@ -74,6 +82,11 @@ impl ClipmapOptions {
         }
         if self.levels == Some(0) {
             return Err(misuse("levels", "0 levels draw nothing".into()).advice("ask for at least 1"));
+        }
+        if let Some(px) = self.max_error_px.filter(|px| !(MAX_ERROR_PX.contains(px))) {
+            let what = format!("{px:?} pixels cannot be promised");
+            let [least, most] = [MAX_ERROR_PX.start(), MAX_ERROR_PX.end()];
+            return Err(misuse("greatest error", what).advice(format!("ask for {least} to {most} pixels")));
         }
         if self.upload_budget_bytes.is_some() && self.wait == Wait::All {
             let what = "a frame that waits for all of its data can keep no budget";

@@ -5,6 +5,7 @@ use glam::DVec3;
 
 use super::alpha::MARGIN;
 use super::constants::{LevelConstants, Ring};
+use super::extent::Extent;
 use super::eye::Eye;
 use super::frustum::Frustum;
 use super::held::HeldField;
@@ -22,6 +23,14 @@ pub struct Instance {
     /// The height in metres above the DEM's base at which void vertices are put: within the patch's bounds, so that
     /// the triangles of a hole, which are discarded, stay where the patch is.
     pub fill: f32,
+}
+
+impl Instance {
+    /// The patch.
+    pub fn patch(&self) -> Patch {
+        let [a, b] = self.origin.map(|o| i64::from(o) / PATCH);
+        Patch::new(self.level, a, b)
+    }
 }
 
 /// A side of a patch.
@@ -259,16 +268,32 @@ impl Scene<'_> {
 
     /// Whether alpha may be 1 somewhere on a patch that is drawn; with a margin for what the shader rounds.
     fn may_reach_1(&self, patch: Patch) -> bool {
-        let side = PATCH << patch.level;
-        let farthest = |index: i64, axis: usize| {
-            let first = (index * side - self.eye.anchor[axis]) as f64 - self.eye.fraction[axis];
-            first.abs().max((first + side as f64).abs())
-        };
-        let ground = farthest(patch.a, 0).max(farthest(patch.b, 1)) / (1i64 << patch.level) as f64;
-        let d = ground.max(f64::from(self.levels[patch.level as usize].climb));
         let parent = patch.parent();
-        d > self.ring.reach() as f64 - MARGIN
+        self.distances(patch)[1] > self.ring.reach() as f64 - MARGIN
             || f64::from(self.held.greatest(patch.level, parent.a, parent.b)) > 1.0 - MARGIN
+    }
+
+    /// The least and the greatest `d` on a patch, in steps of its level.
+    pub(super) fn distances(&self, patch: Patch) -> [f64; 2] {
+        let side = PATCH << patch.level;
+        let axis = |index: i64, axis: usize| {
+            let first = (index * side - self.eye.anchor[axis]) as f64 - self.eye.fraction[axis];
+            let last = first + side as f64;
+            [first.max(-last).max(0.0), first.abs().max(last.abs())]
+        };
+        let (x, z) = (axis(patch.a, 0), axis(patch.b, 1));
+        let step = (1i64 << patch.level) as f64;
+        let climb = f64::from(self.levels[patch.level as usize].climb);
+        [0, 1].map(|end| (x[end].max(z[end]) / step).max(climb))
+    }
+
+    /// `d` of sample (i, j) of `level`, in steps of the level.
+    pub(super) fn distance(&self, level: u32, i: i64, j: i64) -> f64 {
+        let axis = |index: i64, axis: usize| {
+            ((index << level) - self.eye.anchor[axis]) as f64 - self.eye.fraction[axis]
+        };
+        let ground = axis(i, 0).abs().max(axis(j, 1).abs()) / (1i64 << level) as f64;
+        ground.max(f64::from(self.levels[level as usize].climb))
     }
 
     fn borders_coarser(&self, patch: Patch, neighbour: Patch) -> bool {
@@ -278,7 +303,7 @@ impl Scene<'_> {
             && !self.refined(neighbour.parent())
     }
 
-    fn over_the_edge(&self, patch: Patch) -> bool {
+    pub(super) fn over_the_edge(&self, patch: Patch) -> bool {
         let end = |index: i64| ((index + 1) * PATCH) << patch.level;
         end(patch.a) > self.grid.size.width - 1 || end(patch.b) > self.grid.size.height - 1
     }
@@ -292,25 +317,21 @@ impl Scene<'_> {
         }
     }
 
+    /// Low and high corner of a patch's box, in metres from the eye as drawn.
+    pub(super) fn patch_box(&self, patch: Patch, heights: [f32; 2]) -> [DVec3; 2] {
+        let extent = Extent {
+            grid: self.grid,
+            eye: self.eye,
+            vertical_scale: self.vertical_scale,
+        };
+        let (x, z) = (patch.a * PATCH, patch.b * PATCH);
+        extent.of(patch.level, Rect::new(x, z, x + PATCH, z + PATCH), heights)
+    }
+
     fn unseen(&self, patch: Patch, heights: [f32; 2]) -> bool {
         let Some(frustum) = self.frustum else { return false };
-        let side = PATCH << patch.level;
-        let ground = |index: i64, axis: usize| {
-            let first = (index * side - self.eye.anchor[axis]) as f64 - self.eye.fraction[axis];
-            [first, first + side as f64].map(|s| s * self.grid.spacing_m[axis])
-        };
-        let [x0, x1] = ground(patch.a, 0);
-        let [z0, z1] = ground(patch.b, 1);
-        let scaled = heights.map(|h| {
-            let relative = f64::from(h) - self.eye.height_m;
-            if self.vertical_scale == 0.0 {
-                0.0
-            } else {
-                relative * self.vertical_scale
-            }
-        });
-        let (y0, y1) = (scaled[0].min(scaled[1]), scaled[0].max(scaled[1]));
-        frustum.excludes(DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1))
+        let [low, high] = self.patch_box(patch, heights);
+        frustum.excludes(low, high)
     }
 }
 

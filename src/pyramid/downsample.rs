@@ -2,9 +2,9 @@
 //!
 //! Coarse sample (i, j) is centred on fine sample (2i, 2j). Along one axis it is
 //!
-//! `C[i] = f[2i] / 2 + sum over k of w_k (f[2i - 2k - 1] + f[2i + 2k + 1])`
+//! `C[i] = w f[2i] + sum over k of w_k (f[2i - 2k - 1] + f[2i + 2k + 1])`
 //!
-//! with the weights `w_k` of [`Filter`]. *The one rule:* a pair of which either sample is missing (off the
+//! with the weights `w` and `w_k` of [`Filter`], kept within the range of the samples in it where the filter clamps. *The one rule:* a pair of which either sample is missing (off the
 //! grid, or no data) counts as twice the centre, so the signal is continued by point reflection about the
 //! centre. Every pair of a linear signal sums to twice its centre, missing or not; hence a plane is reproduced
 //! up to the very edge, and a coarse sample is void exactly where its centre is.
@@ -80,7 +80,7 @@ pub fn downsample(
             cancelled.store(true, Ordering::Relaxed);
             return;
         }
-        filter_band(fine, size, filter.pairs(), rounding_m, band * BAND, rows);
+        filter_band(fine, size, filter, rounding_m, band * BAND, rows);
         progress.advance(rows.len() as u64);
     });
     if cancelled.into_inner() {
@@ -94,7 +94,7 @@ pub fn downsample(
 fn filter_band(
     fine: &[f32],
     size: Size,
-    pairs: &[f64],
+    filter: &Filter,
     rounding_m: Option<f64>,
     first: usize,
     rows: &mut [f32],
@@ -103,7 +103,8 @@ fn filter_band(
     let coarse_width = size.level(1).width as usize;
     let end = first + rows.len() / coarse_width;
     let centred = height.div_ceil(2); // coarse rows whose centre is a fine row
-    let reach = 2 * pairs.len() - 1;
+    let pairs = filter.pairs().len();
+    let reach = (2 * pairs).saturating_sub(1);
 
     // The fine rows under the kernels of this band, filtered along the row. A continued last row needs the
     // two coarse rows before it, which may lie in the band above.
@@ -118,14 +119,14 @@ fn filter_band(
     let mut scratch = RowScratch::default();
     for (row, out) in filtered.chunks_mut(coarse_width).enumerate() {
         let start = (low + row) * width;
-        filter_row(&fine[start..start + width], pairs, &mut scratch, out);
+        filter_row(&fine[start..start + width], filter, &mut scratch, out);
     }
     let filtered_row = |row: usize| &filtered[(row - low) * coarse_width..][..coarse_width];
 
     let missing = vec![f64::NAN; coarse_width];
     let column_sums = |j: usize, out: &mut [f64]| {
         let centre = filtered_row(2 * j);
-        let pair_rows: Vec<(&[f64], &[f64])> = (0..pairs.len())
+        let pair_rows: Vec<(&[f64], &[f64])> = (0..pairs)
             .map(|k| match (2 * j).checked_sub(2 * k + 1) {
                 Some(above) if 2 * j + 2 * k + 1 < height => {
                     (filtered_row(above), filtered_row(2 * j + 2 * k + 1))
@@ -135,17 +136,10 @@ fn filter_band(
             .collect();
         for start in (0..coarse_width).step_by(BLOCK) {
             let block = start..(start + BLOCK).min(coarse_width);
-            let out = &mut out[block.clone()];
-            half(&centre[block.clone()], out);
-            for (&weight, (above, below)) in pairs.iter().zip(&pair_rows) {
-                add_pair(
-                    weight,
-                    &above[block.clone()],
-                    &below[block.clone()],
-                    &centre[block.clone()],
-                    out,
-                );
-            }
+            let taps = pair_rows
+                .iter()
+                .map(|(above, below)| (&above[block.clone()], &below[block.clone()]));
+            weigh(filter, &centre[block.clone()], taps, &mut out[block.clone()]);
         }
     };
 
@@ -181,8 +175,8 @@ struct RowScratch {
 }
 
 /// Filters one fine row into one coarse row.
-fn filter_row(fine: &[f32], pairs: &[f64], scratch: &mut RowScratch, out: &mut [f64]) {
-    let pad = pairs.len();
+fn filter_row(fine: &[f32], filter: &Filter, scratch: &mut RowScratch, out: &mut [f64]) {
+    let pad = filter.pairs().len();
     let RowScratch { even, odd } = scratch;
     even.clear();
     even.extend(fine.iter().step_by(2).map(|&h| f64::from(h)));
@@ -194,20 +188,17 @@ fn filter_row(fine: &[f32], pairs: &[f64], scratch: &mut RowScratch, out: &mut [
     let centred = even.len();
     for start in (0..centred).step_by(BLOCK) {
         let count = BLOCK.min(centred - start);
-        let centre = &even[start..start + count];
-        let sums = &mut out[start..start + count];
-        half(centre, sums);
-        for (k, &weight) in pairs.iter().enumerate() {
+        let taps = (0..pad).map(|k| {
             // Odd sample m, at fine index 2m + 1, lies at m + pad.
             let (west, east) = (start + pad - 1 - k, start + pad + k);
-            add_pair(
-                weight,
-                &odd[west..west + count],
-                &odd[east..east + count],
-                centre,
-                sums,
-            );
-        }
+            (&odd[west..west + count], &odd[east..east + count])
+        });
+        weigh(
+            filter,
+            &even[start..start + count],
+            taps,
+            &mut out[start..start + count],
+        );
     }
     if out.len() > centred {
         let last = odd[pad + centred - 1];
@@ -220,10 +211,21 @@ fn filter_row(fine: &[f32], pairs: &[f64], scratch: &mut RowScratch, out: &mut [
     }
 }
 
-/// Begins sums with half of the centres.
-fn half(centre: &[f64], sums: &mut [f64]) {
+/// The sums of a block: centres, and for each pair of taps the samples on either side.
+fn weigh<'a>(
+    filter: &Filter,
+    centre: &[f64],
+    taps: impl Iterator<Item = (&'a [f64], &'a [f64])> + Clone,
+    sums: &mut [f64],
+) {
     for (sum, c) in sums.iter_mut().zip(centre) {
-        *sum = 0.5 * c;
+        *sum = filter.centre() * c;
+    }
+    for (&weight, (left, right)) in filter.pairs().iter().zip(taps.clone()) {
+        add_pair(weight, left, right, centre, sums);
+    }
+    if filter.is_clamped() {
+        clamp(centre, taps, sums);
     }
 }
 
@@ -233,6 +235,30 @@ fn add_pair(weight: f64, left: &[f64], right: &[f64], centre: &[f64], sums: &mut
         let pair = l + r;
         let pair = if pair.is_nan() { 2.0 * c } else { pair };
         *sum += weight * pair;
+    }
+}
+
+/// Keeps each sum within the range of the samples in it: the centre, and both of each pair that is whole.
+fn clamp<'a>(centre: &[f64], taps: impl Iterator<Item = (&'a [f64], &'a [f64])>, sums: &mut [f64]) {
+    let (mut low, mut high) = ([0.0; BLOCK], [0.0; BLOCK]);
+    let (low, high) = (&mut low[..centre.len()], &mut high[..centre.len()]);
+    low.copy_from_slice(centre);
+    high.copy_from_slice(centre);
+    for (left, right) in taps {
+        for (i, (l, r)) in left.iter().zip(right).enumerate() {
+            if !(l + r).is_nan() {
+                low[i] = low[i].min(*l).min(*r);
+                high[i] = high[i].max(*l).max(*r);
+            }
+        }
+    }
+    for (i, sum) in sums.iter_mut().enumerate() {
+        // Where the centre is void the sum is, and no comparison holds.
+        if *sum < low[i] {
+            *sum = low[i];
+        } else if *sum > high[i] {
+            *sum = high[i];
+        }
     }
 }
 

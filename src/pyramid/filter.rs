@@ -1,6 +1,14 @@
-//! The kernel that halves a level: a sinc windowed by Blackman, as a half-band filter.
+//! The kernel that halves a level: a symmetric one on the centre and the odd taps, by default a windowed sinc.
+
+mod kind;
+
+pub use kind::FilterKind;
 
 /// Lobes a side of the default filter.
+///
+/// Decided by `cargo bench --bench filters` over six real DEMs: the RMS of `S_l - S0` over all levels falls by 2.3 % from
+/// 3 lobes to 4, by 0.9 % from 4 to 5 and by 0.2 % from 5 to 6, while what the kernel rings grows by 39, 27 and 17 %. The
+/// last lobe that gains more than 1 % is the fourth.
 pub const DEFAULT_LOBES: u32 = 4;
 
 /// The greatest number of lobes a side that a filter may have.
@@ -10,23 +18,19 @@ pub const MAX_LOBES: u32 = 32;
 /// products of samples of one size. The 2^-29 by which a tap is off is far below the filter's own ripple.
 const TAP_STEP: f64 = 1.0 / (1u64 << 28) as f64;
 
-/// A symmetric half-band kernel, centred on a fine sample.
+/// A symmetric kernel, centred on a fine sample: the centre and pairs of taps at the odd distances.
 ///
-/// With `t` the distance from the centre in fine samples and `a` the lobes a side (counted in coarse
-/// samples, so that the kernel ends at `t = 2a`), a tap is
-///
-/// `sin(pi t / 2) / (pi t) * (0.42 + 0.5 cos(pi t / 2a) + 0.08 cos(pi t / a))`
-///
-/// the sinc whose cut-off is half the fine Nyquist frequency, times Blackman's window (Blackman and Tukey,
-/// The Measurement of Power Spectra, 1958, section B.5). It is 0 at every even `t` but the centre. The centre is exactly 1/2
-/// and the odd taps are normalised to sum exactly 1/2: a constant is kept and the fine Nyquist wave vanishes,
-/// both without rounding.
+/// The weights of all sum to exactly 1, so a constant is kept without rounding. Those of most kinds are half-band
+/// filters: the centre is exactly 1/2 and the odd taps sum exactly to 1/2, so the fine Nyquist wave vanishes without
+/// rounding too.
 ///
 /// A pair of taps of which either is missing counts as twice the centre (see
 /// [`downsample`](super::downsample())).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filter {
-    /// Weight of the pair of samples at distance `2k + 1`, for k from 0; they sum to 1/4.
+    kind: FilterKind,
+    centre: f64,
+    /// Weight of the pair of samples at distance `2k + 1`, for k from 0.
     pairs: Vec<f64>,
 }
 
@@ -36,42 +40,70 @@ impl Default for Filter {
     }
 }
 
+impl From<FilterKind> for Filter {
+    /// The filter of that name, with [`DEFAULT_LOBES`] where it may have any number.
+    fn from(kind: FilterKind) -> Self {
+        Self::new(kind, DEFAULT_LOBES)
+    }
+}
+
 impl Filter {
     /// The sinc windowed by Blackman over `lobes` lobes a side, from 1 (the kernel 1/4 1/2 1/4) to
     /// [`MAX_LOBES`]; what lies outside counts as the nearest of them, as [`Filter::lobes`] then says.
+    ///
+    /// With `t` the distance from the centre in fine samples and `a` the lobes a side (counted in coarse
+    /// samples, so that the kernel ends at `t = 2a`), a tap is
+    ///
+    /// `sin(pi t / 2) / (pi t) * (0.42 + 0.5 cos(pi t / 2a) + 0.08 cos(pi t / a))`
+    ///
+    /// the sinc whose cut-off is half the fine Nyquist frequency, times Blackman's window (Blackman and Tukey,
+    /// The Measurement of Power Spectra, 1958, section B.5). It is 0 at every even `t` but the centre.
     pub fn sinc_blackman(lobes: u32) -> Self {
-        use std::f64::consts::PI;
-        let lobes = lobes.clamp(1, MAX_LOBES);
-        let reach = f64::from(2 * lobes);
-        let raw: Vec<f64> = (0..lobes)
-            .map(|k| {
-                let t = f64::from(2 * k + 1);
-                let sinc = (PI * t / 2.0).sin() / (PI * t);
-                sinc * (0.42 + 0.5 * (PI * t / reach).cos() + 0.08 * (2.0 * PI * t / reach).cos())
-            })
-            .collect();
-        let sum: f64 = raw.iter().sum();
-        let mut pairs: Vec<f64> = raw
-            .iter()
-            .map(|w| (w / sum * 0.25 / TAP_STEP).round() * TAP_STEP)
-            .collect();
-        // What rounding left over goes to the greatest tap; all of this is exact.
-        let rest: f64 = pairs[1..].iter().sum();
-        pairs[0] = 0.25 - rest;
-        Self { pairs }
+        Self::new(FilterKind::SincBlackman, lobes.clamp(1, MAX_LOBES))
     }
 
-    /// Lobes a side, in coarse samples; also the number of pairs of taps.
+    fn new(kind: FilterKind, lobes: u32) -> Self {
+        let (raw, side) = kind.side(lobes);
+        let sum: f64 = raw.iter().sum();
+        let on_step = |w: f64| (w / TAP_STEP).round() * TAP_STEP;
+        let mut pairs: Vec<f64> = raw.iter().map(|w| on_step(w / sum * side)).collect();
+        if let Some(greatest) = pairs.first_mut() {
+            *greatest = on_step(side);
+        }
+        // What rounding left over goes to the greatest tap; all of this is exact.
+        for k in 1..pairs.len() {
+            pairs[0] -= pairs[k];
+        }
+        Self {
+            kind,
+            centre: 1.0 - 2.0 * on_step(side),
+            pairs,
+        }
+    }
+
+    /// Its name.
+    pub fn kind(&self) -> FilterKind {
+        self.kind
+    }
+
+    /// How far the kernel reaches a side, in coarse samples; also the number of pairs of taps. For the windowed sincs
+    /// these are its lobes, for others what lobes would reach as far: 0 for `point`, 1 for `box` and `bilinear`, 2 for
+    /// `cubic`, 3 for `lanczos3`.
     pub fn lobes(&self) -> u32 {
         self.pairs.len() as u32
     }
 
-    /// The filter's name, as `--filter` and the terrain file give it.
-    pub fn name(&self) -> &'static str {
-        "sinc-blackman"
+    /// Weight of the centre.
+    pub fn centre(&self) -> f64 {
+        self.centre
     }
 
-    /// Weights of the pairs at distances 1, 3, 5, ... fine samples; the centre's is 1/2.
+    /// Whether results are kept within the range of the samples that are weighed, along each axis in turn.
+    pub fn is_clamped(&self) -> bool {
+        self.kind == FilterKind::SincBlackmanClamped
+    }
+
+    /// Weights of the pairs at distances 1, 3, 5, ... fine samples.
     pub fn pairs(&self) -> &[f64] {
         &self.pairs
     }
@@ -81,32 +113,37 @@ impl Filter {
     ///
     /// Let `n` be the sum of the negative weights' sizes in one dimension; the positive ones then sum to
     /// `1 + n`. On samples in 0 to 1 a result lies in `-n` to `1 + n`. Voids and edges do not widen that: a
-    /// missing pair moves its weight to the centre, which (as `n < 1/2`) stays positive, so a missing positive
+    /// missing pair moves its weight to the centre, which (as `n` is below its weight) stays positive, so a missing positive
     /// pair leaves both sums as they are and a missing negative one shrinks both. Rows thus give values in an
     /// interval of width `1 + 2n`, and columns of those exceed it by `n (1 + 2n)` more: in all
     /// `n + n (1 + 2n) = 2n (1 + n)`, which is also the sum of the negative weights of the product kernel,
-    /// hence attained.
+    /// hence attained. A filter that clamps has none: rows stay within their samples, columns within those rows.
     ///
     /// It does not speak of a last row or column that lies beyond the fine level (it continues the coarse row
     /// in a straight line), nor of the rounding of a stored height.
     pub fn overshoot(&self) -> f64 {
+        if self.is_clamped() {
+            return 0.0;
+        }
         let n: f64 = self.pairs.iter().map(|w| 2.0 * (-w).max(0.0)).sum();
         2.0 * n * (1.0 + n)
     }
 
     /// The factor by which the filter multiplies a wave of `frequency` times the fine Nyquist frequency
-    /// (0 to 1; the coarse Nyquist frequency is 0.5), along one axis and away from edges and voids.
+    /// (0 to 1; the coarse Nyquist frequency is 0.5), along one axis and away from edges and voids, before any
+    /// clamping.
     ///
-    /// With 4 lobes: 0.999 at 0.1, 0.989 at 0.25, 0.858 at 0.375, 0.5 at 0.5, 0.142 at 0.625, 0.011 at 0.75,
+    /// The default, of 4 lobes: 0.999 at 0.1, 0.989 at 0.25, 0.858 at 0.375, 0.5 at 0.5, 0.142 at 0.625, 0.011 at 0.75,
     /// and at most 0.012 from there to 1, where it is 0.
     pub fn response(&self, frequency: f64) -> f64 {
         let wave = |k: usize| (std::f64::consts::PI * frequency * (2 * k + 1) as f64).cos();
-        0.5 + self
-            .pairs
-            .iter()
-            .enumerate()
-            .map(|(k, w)| 2.0 * w * wave(k))
-            .sum::<f64>()
+        self.centre
+            + self
+                .pairs
+                .iter()
+                .enumerate()
+                .map(|(k, w)| 2.0 * w * wave(k))
+                .sum::<f64>()
     }
 }
 
@@ -114,27 +151,72 @@ impl Filter {
 mod tests {
     use super::*;
 
+    /// All kinds, and the default's with every number of lobes.
+    fn all() -> impl Iterator<Item = Filter> {
+        let kinds = FilterKind::ALL.into_iter().map(Filter::from);
+        kinds.chain((1..=MAX_LOBES).map(Filter::sinc_blackman))
+    }
+
     #[test]
     fn weights_sum_exactly_and_vanish_exactly_at_nyquist() {
-        for lobes in 1..=MAX_LOBES {
-            let filter = Filter::sinc_blackman(lobes);
-            assert_eq!(filter.lobes(), lobes);
-            let mut plus = 0.5;
-            let mut minus = 0.5;
-            for w in filter.pairs() {
+        for filter in all() {
+            let name = format!("{} of {} lobes", filter.kind(), filter.lobes());
+            let mut plus = filter.centre();
+            let mut minus = filter.centre();
+            for w in filter.pairs().iter().chain([&filter.centre()]) {
                 assert_eq!(
                     (w / TAP_STEP).fract(),
                     0.0,
-                    "{lobes} lobes: {w} is not a multiple of the step"
+                    "{name}: {w} is not a multiple of the step"
                 );
+            }
+            for w in filter.pairs() {
                 plus += w * 2.0;
                 minus += w * -2.0;
             }
-            assert_eq!((plus, minus), (1.0, 0.0), "{lobes} lobes");
+            assert_eq!(plus, 1.0, "{name}");
+            match filter.kind() {
+                FilterKind::Point => assert_eq!(minus, 1.0),
+                FilterKind::Box => assert!((minus + 1.0 / 3.0).abs() < 2.0 * TAP_STEP, "{minus}"),
+                _ => assert_eq!(minus, 0.0, "{name}"),
+            }
         }
         assert_eq!(Filter::sinc_blackman(1).pairs(), [0.25]);
         assert_eq!(Filter::sinc_blackman(0), Filter::sinc_blackman(1));
         assert_eq!(Filter::sinc_blackman(u32::MAX).lobes(), MAX_LOBES);
+        assert_eq!(Filter::default(), FilterKind::default().into());
+    }
+
+    #[test]
+    fn the_others_have_the_taps_of_their_sources() {
+        // By distance from the centre; worked out by hand from the sources' formulas.
+        let table: [(&str, f64, &[f64]); 5] = [
+            ("point", 1.0, &[]),
+            ("box", 1.0 / 3.0, &[1.0 / 3.0]),
+            ("bilinear", 0.5, &[0.25]),
+            ("cubic", 0.5, &[0.28125, -0.03125]),
+            ("lanczos3", 0.5, &[0.305707, -0.067935, 0.012229]),
+        ];
+        for (name, centre, pairs) in table {
+            let filter = Filter::from(name.parse::<FilterKind>().unwrap());
+            assert_eq!(filter.pairs().len(), pairs.len(), "{name}");
+            let taps = filter.pairs().iter().zip(pairs);
+            for (got, want) in taps.chain([(&filter.centre(), &centre)]) {
+                assert!((got - want).abs() < 1e-6, "{name}: {got} against {want}");
+            }
+        }
+        let clamped = Filter::from(FilterKind::SincBlackmanClamped);
+        assert_eq!(clamped.pairs(), Filter::default().pairs());
+        assert!(clamped.is_clamped() && !Filter::default().is_clamped());
+    }
+
+    #[test]
+    fn names_come_back_and_others_are_refused() {
+        for kind in FilterKind::ALL {
+            assert_eq!(kind.name().parse::<FilterKind>().unwrap(), kind);
+        }
+        let error = "Lanczos".parse::<FilterKind>().unwrap_err().to_string();
+        assert!(error.contains("Lanczos") && error.contains("lanczos3"), "{error}");
     }
 
     #[test]
@@ -193,22 +275,26 @@ mod tests {
 
     #[test]
     fn the_overshoot_is_attained_by_the_worst_samples() {
-        for lobes in 1..=MAX_LOBES {
-            let filter = Filter::sinc_blackman(lobes);
+        for filter in all().filter(|filter| !filter.is_clamped()) {
+            let name = format!("{} of {} lobes", filter.kind(), filter.lobes());
             // Samples of 1 under negative weights of the product kernel, 0 elsewhere.
             let axis: Vec<f64> = filter
                 .pairs()
                 .iter()
                 .flat_map(|w| [*w, *w])
-                .chain([0.5])
+                .chain([filter.centre()])
                 .collect();
             let worst: f64 = axis
                 .iter()
                 .flat_map(|a| axis.iter().map(move |b| (a * b).min(0.0)))
                 .sum();
-            assert!((filter.overshoot() + worst).abs() < 1e-12, "{lobes} lobes");
+            assert!((filter.overshoot() + worst).abs() < 1e-12, "{name}");
             let negative: f64 = filter.pairs().iter().map(|w| 2.0 * (-w).max(0.0)).sum();
-            assert!(negative < 0.5, "{lobes} lobes: the centre could turn negative");
+            assert!(
+                negative < filter.centre(),
+                "{name}: the centre could turn negative"
+            );
         }
+        assert_eq!(Filter::from(FilterKind::SincBlackmanClamped).overshoot(), 0.0);
     }
 }

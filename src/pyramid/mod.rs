@@ -20,7 +20,7 @@ mod tests;
 
 pub use bounds::SATURATION;
 pub use downsample::{downsample, rounding_step};
-pub use filter::{DEFAULT_LOBES, Filter, MAX_LOBES};
+pub use filter::{DEFAULT_LOBES, Filter, FilterKind, MAX_LOBES};
 
 /// All levels of a DEM in memory: heights, and once they are made bounds and light.
 pub struct Pyramid {

@@ -12,7 +12,7 @@ use crate::grid::{Grid, Rect};
 use crate::levels::{Arrival, Bounds, Levels, LightSample};
 use crate::light::Sun;
 use crate::progress::Progress;
-use crate::pyramid::DEFAULT_LOBES;
+use crate::pyramid::Filter;
 use crate::source::{self, Description, HeightSource, ReadAt, Synth};
 use crate::terrain::{Meta, TerrainFile, is_terrain};
 
@@ -78,7 +78,7 @@ impl Terrain {
     /// # Errors
     /// Those of `source`; [`crate::ErrorKind::Limit`] where it is too large to be held.
     pub fn from_source(source: &dyn HeightSource, progress: &dyn Progress) -> Result<Self> {
-        let pyramid = crate::build::build_pyramid(source, DEFAULT_LOBES, progress)?;
+        let pyramid = crate::build::build_pyramid(source, &Filter::default(), progress)?;
         let description = source.description().clone();
         Ok(Self {
             name: description.name.clone(),

@@ -11,7 +11,7 @@
 //! | `clipscape.offset` | column and row of sample (0, 0) |
 //! | `clipscape.crs`, `.origin`, `.pixel`, `.registration`, `.geographic` | [`Georeference`] |
 //! | `clipscape.vertical_unit` | unit of heights as read |
-//! | `clipscape.filter`, `.lobes`, `.rounding_step` | how levels above 0 were made; the step in metres |
+//! | `clipscape.filter`, `.lobes`, `.rounding_step` | how levels above 0 were made: a name of [`crate::pyramid::FilterKind`], its kernel's reach a side in coarse samples, the step in metres |
 //! | `clipscape.sun`, `.sky_directions` | azimuth and altitude in degrees; number of directions |
 //! | `clipscape.source`, `.source_bytes`, `.source_modified` | name, length, seconds since 1970 |
 //! | `clipscape.tool` | program and version |
@@ -64,7 +64,7 @@ pub struct Meta {
     pub vertical_unit: String,
     /// Name of the filter that made the levels above 0.
     pub filter: String,
-    /// Its lobes a side.
+    /// How far its kernel reaches a side, in coarse samples: its lobes, see [`crate::pyramid::Filter::lobes`].
     pub lobes: u32,
     /// The step to which heights above level 0 are rounded, in metres, where they are.
     pub rounding_step_m: Option<f64>,

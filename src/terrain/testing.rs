@@ -140,7 +140,7 @@ pub(crate) fn meta(grid: Grid, light: bool) -> Meta {
             geographic: true,
         }),
         vertical_unit: "metre".into(),
-        filter: "blackman-sinc".into(),
+        filter: "sinc-blackman".into(),
         lobes: 4,
         rounding_step_m: Some(1.0 / 64.0),
         light: light.then_some(LightMeta {

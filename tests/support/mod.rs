@@ -9,6 +9,8 @@ use clipscape::levels::{Arrival, Bounds, Levels, LightSample};
 use half::f16;
 
 pub mod facts;
+pub mod motion;
+pub mod scenes;
 
 /// Levels whose every sample is a function of level, column and row; NaN for no data.
 pub struct Formula<F> {

@@ -33,7 +33,8 @@ impl Oracle<'_> {
             });
         }
         let centre = at(2 * i)?;
-        let mut sum = 0.5 * centre;
+        let mut sum = self.filter.centre() * centre;
+        let mut used = vec![centre];
         for (k, weight) in self.filter.pairs().iter().enumerate() {
             let t = 2 * k as i64 + 1;
             let tap = |at_index: i64| {
@@ -44,10 +45,18 @@ impl Oracle<'_> {
                 }
             };
             let pair = match (tap(2 * i - t), tap(2 * i + t)) {
-                (Some(a), Some(b)) => a + b,
+                (Some(a), Some(b)) => {
+                    used.extend([a, b]);
+                    a + b
+                }
                 _ => 2.0 * centre,
             };
             sum += weight * pair;
+        }
+        if self.filter.is_clamped() {
+            let low = used.iter().fold(centre, |low, h| low.min(*h));
+            let high = used.iter().fold(centre, |high, h| high.max(*h));
+            sum = sum.clamp(low, high);
         }
         Some(sum)
     }

@@ -4,6 +4,7 @@ use super::oracle::Oracle;
 use super::*;
 use crate::grid::Rect;
 use crate::progress::Silent;
+use crate::pyramid::FilterKind;
 use crate::pyramid::random::Random;
 use crate::work::Serial;
 
@@ -21,15 +22,11 @@ impl Work for Backwards {
 }
 
 fn run(fine: &[f32], width: i64, height: i64) -> Vec<f32> {
-    downsample(
-        fine,
-        Size { width, height },
-        &Filter::default(),
-        None,
-        &Serial,
-        &Silent,
-    )
-    .expect("filters")
+    run_with(&Filter::default(), fine, width, height)
+}
+
+fn run_with(filter: &Filter, fine: &[f32], width: i64, height: i64) -> Vec<f32> {
+    downsample(fine, Size { width, height }, filter, None, &Serial, &Silent).expect("filters")
 }
 
 fn bits(level: &[f32]) -> Vec<u32> {
@@ -72,7 +69,10 @@ fn it_equals_the_plain_version_bit_for_bit() {
         }
         let voids = [0.0, 0.02, 0.3, 0.9][seed as usize % 4];
         let fine = random.heights(size.samples(), -500.0, 4000.0, voids);
-        let filter = Filter::sinc_blackman(1 + (seed % 7) as u32);
+        let filter = match FilterKind::ALL.get(seed as usize % 14) {
+            Some(&kind) => kind.into(),
+            None => Filter::sinc_blackman(1 + (seed % 7) as u32),
+        };
         for rounding_m in [None, Some(1.0 / 64.0)] {
             let want = Oracle {
                 fine: &fine,
@@ -130,18 +130,22 @@ fn the_fine_nyquist_wave_vanishes_exactly() {
             .cells()
             .map(|(x, z)| amplitude * [1.0, -1.0][(phase(x, z) & 1) as usize])
             .collect();
-        let coarse = run(&fine, size.width, size.height);
-        let size = size.level(1);
-        let inner = Rect::new(4, 4, size.width - 4, size.height - 4);
-        for (i, j) in inner.cells() {
-            assert_eq!(
-                coarse[(j * size.width + i) as usize],
-                0.0,
-                "wave {wave} at ({i}, {j})"
-            );
+        for kind in FilterKind::ALL {
+            let coarse = run_with(&kind.into(), &fine, size.width, size.height);
+            let size = size.level(1);
+            let inner = Rect::new(4, 4, size.width - 4, size.height - 4);
+            let inner = inner
+                .cells()
+                .map(|(i, j)| ((i, j), coarse[(j * size.width + i) as usize]));
+            for (at, h) in inner {
+                match kind {
+                    // The controls: each centre is a crest, which comes through whole, or in part.
+                    FilterKind::Point => assert_eq!(h, amplitude, "wave {wave} at {at:?}"),
+                    FilterKind::Box => assert!(h.abs() > amplitude / 10.0, "wave {wave} at {at:?}: {h}"),
+                    _ => assert_eq!(h, 0.0, "{kind}, wave {wave} at {at:?}"),
+                }
+            }
         }
-        // Unfiltered, it would come through whole: each centre is a crest.
-        assert_eq!(fine[0], amplitude);
     }
 }
 
@@ -250,6 +254,36 @@ fn no_result_leaves_the_range_under_the_kernel_by_more_than_the_overshoot() {
                 .for_each(|(b, v)| *b = if v.is_nan() { f32::NAN } else { *b });
             assert!(worst_excess(&lifted, size, &broken, 7) > filter.overshoot());
         }
+    }
+}
+
+#[test]
+fn the_clamped_filter_never_leaves_the_range_under_its_kernel() {
+    let size = Size {
+        width: 90,
+        height: 77,
+    };
+    let clamped = Filter::from(FilterKind::SincBlackmanClamped);
+    let reach = 2 * i64::from(clamped.lobes()) - 1;
+    let step: Vec<f32> = size
+        .rect()
+        .cells()
+        .map(|(x, z)| if 2 * x > 90 + z { 900.0 } else { 100.0 })
+        .collect();
+    let noise = |seed, voids| Random::new(seed).heights(size.samples(), -50.0, 9000.0, voids);
+    for (name, fine) in [
+        ("step", step),
+        ("noise", noise(1, 0.0)),
+        ("noise with voids", noise(2, 0.4)),
+    ] {
+        let kept = run_with(&clamped, &fine, size.width, size.height);
+        assert_eq!(worst_excess(&fine, size, &kept, reach), 0.0, "{name}");
+        // Control: the same kernel without the clamp does leave it on a step.
+        let free = run(&fine, size.width, size.height);
+        if name == "step" {
+            assert!(worst_excess(&fine, size, &free, reach) > 0.01, "{name}");
+        }
+        assert_ne!(bits(&kept), bits(&free), "{name}");
     }
 }
 
