@@ -1,12 +1,13 @@
 //! `clipscape measure`: one flight over many settings, and a report.
 
-use super::Outcome;
 use super::args::MeasureArgs;
 use super::progress::Terminal;
 use super::render::{checksum, command_line, files_checksum, read_flight};
+use super::{Outcome, measure_depth};
 use crate::build::DEFAULT_MEMORY_BYTES;
 use crate::camera::{Flight, check_picture};
 use crate::clipmap::ClipmapOptions;
+use crate::error::{Error, ErrorKind};
 use crate::gpu;
 use crate::levels::Levels;
 use crate::measure::{Effort, FILES, Folder, MeasureOptions, SettingLists, measure};
@@ -19,6 +20,13 @@ use crate::stream::Terrain;
 
 /// Runs the command.
 pub(super) fn run(args: &MeasureArgs, terminal: &Terminal) -> Outcome {
+    if let Some((depth, camera)) = args.depth.as_deref().zip(args.camera.as_deref()) {
+        return measure_depth::run(args, [depth, camera], terminal);
+    }
+    let (Some(flight), Some(output)) = (&args.flight, &args.output) else {
+        let what = "neither a flight with a folder nor the depth of a frame is given";
+        return Err(Error::new(ErrorKind::Misuse, "measure", what).into());
+    };
     // What can be refused at once is, before the terrain is read and its pyramid built.
     let lists = lists(args);
     lists.settings()?;
@@ -31,9 +39,9 @@ pub(super) fn run(args: &MeasureArgs, terminal: &Terminal) -> Outcome {
         ..Default::default()
     };
     clipmap.check()?;
-    let (name, json) = read_flight(&args.flight)?;
+    let (name, json) = read_flight(flight)?;
     let flight = Flight::parse(&name, &json)?;
-    let folder = Folder::create(&args.output, &FILES, args.force)?;
+    let folder = Folder::create(output, &FILES, args.force)?;
     let gpu = gpu::open()?;
 
     let terrain = Terrain::open_with(&args.input.inputs, &args.input.read.options(), terminal)?;
@@ -65,7 +73,7 @@ pub(super) fn run(args: &MeasureArgs, terminal: &Terminal) -> Outcome {
     for fault in terrain.faults() {
         terminal.warn(&fault.to_string());
     }
-    terminal.note(&format!("{} is made", args.output.join("report.html").display()));
+    terminal.note(&format!("{} is made", output.join("report.html").display()));
     Ok(())
 }
 

@@ -8,6 +8,8 @@ mod info;
 mod input;
 #[cfg(feature = "gpu")]
 mod measure;
+#[cfg(feature = "gpu")]
+mod measure_depth;
 mod preprocess;
 mod progress;
 #[cfg(feature = "gpu")]

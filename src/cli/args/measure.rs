@@ -21,12 +21,26 @@ pub(in crate::cli) struct MeasureArgs {
     pub(in crate::cli) input: InputArgs,
 
     /// The path: a flight's JSON file
-    #[arg(long, value_name = "FILE")]
-    pub(in crate::cli) flight: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "depth")]
+    pub(in crate::cli) flight: Option<PathBuf>,
 
     /// The folder of the results
-    #[arg(long, short, value_name = "FOLDER")]
-    pub(in crate::cli) output: PathBuf,
+    #[arg(long, short, value_name = "FOLDER", required_unless_present = "depth")]
+    pub(in crate::cli) output: Option<PathBuf>,
+
+    /// Instead of a flight, measure a frame that another program drew of the DEM: an OpenEXR picture with a channel Z or
+    /// depth, metres along the view axis, 0 or infinity where no terrain is drawn
+    #[arg(long, value_name = "FILE.exr", requires = "camera", conflicts_with_all = ["flight", "output", "quick", "size"])]
+    pub(in crate::cli) depth: Option<PathBuf>,
+
+    /// The camera of that frame: {"eye": [x, y, z], "heading": 0, "pitch": 0, "roll": 0, "fov": 60} in the DEM's world
+    /// metres and degrees
+    #[arg(long, value_name = "FILE.json", requires = "depth")]
+    pub(in crate::cli) camera: Option<PathBuf>,
+
+    /// Print the figures of that frame as one JSON object
+    #[arg(long, requires = "depth")]
+    pub(in crate::cli) json: bool,
 
     /// Fewer settings and frames, of 640x360 pixels: about two minutes instead of an hour on a software driver
     #[arg(long)]
@@ -124,7 +138,21 @@ mod tests {
         let args = parse("--filter point,lanczos3 --quick").unwrap();
         assert_eq!(args.filter.unwrap().0, [FilterKind::Point, FilterKind::Lanczos3]);
         assert!(args.quick && args.clip_size.is_none());
+        let frame = |line: &str| {
+            Measure::try_parse_from(format!("measure a.tif {line}").split_whitespace()).map(|m| m.args)
+        };
+        let args = frame("--depth d.exr --camera c.json --json -z -2").unwrap();
+        assert!(args.depth.is_some() && args.json && args.flight.is_none());
         for bad in [
+            "",
+            "--depth d.exr",
+            "--camera c.json",
+            "--depth d.exr --camera c.json --flight f.json",
+        ] {
+            assert!(frame(bad).is_err(), "{bad}");
+        }
+        for bad in [
+            "--json",
             "--clip-size 100",
             "--max-error-px nan",
             "--filter boxy",
