@@ -194,7 +194,15 @@ impl Layout {
         }
         let unknown = self.offsets.iter().zip(&mut self.counts);
         for (offset, count) in unknown.filter(|(_, count)| **count == u64::MAX) {
-            *count = file.size_bytes.saturating_sub(*offset);
+            // A length of 0 would stand for a block that is left out.
+            if *offset >= file.size_bytes {
+                let what = format!(
+                    "has {what} at byte {offset}, but it is {} bytes long",
+                    file.size_bytes
+                );
+                return Err(file.broken(what));
+            }
+            *count = file.size_bytes - *offset;
         }
         Ok(())
     }
