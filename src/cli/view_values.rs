@@ -77,6 +77,14 @@ pub(super) fn clip_size(text: &str) -> Result<ClipSize, String> {
         .ok_or_else(|| "not a power of two from 64 to 2048, nor auto".into())
 }
 
+/// A clip size that is a number.
+pub(super) fn fixed_clip_size(text: &str) -> Result<i64, String> {
+    match clip_size(text) {
+        Ok(ClipSize::Fixed(size)) => Ok(size),
+        _ => Err("not a power of two from 64 to 2048".into()),
+    }
+}
+
 /// An error in pixels that can be promised.
 pub(super) fn max_error(text: &str) -> Result<f64, String> {
     let px = number(text)?;
@@ -171,6 +179,8 @@ mod tests {
         }
         assert_eq!(clip_size("64"), Ok(ClipSize::Fixed(64)));
         assert_eq!(clip_size("auto"), Ok(ClipSize::Auto));
+        assert_eq!(fixed_clip_size("64"), Ok(64));
+        assert!(fixed_clip_size("auto").is_err());
         for bad in ["32", "100", "4096", "-64", "x"] {
             assert!(clip_size(bad).is_err(), "{bad}");
         }

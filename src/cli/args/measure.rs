@@ -51,7 +51,7 @@ pub(in crate::cli) struct MeasureArgs {
     pub(in crate::cli) size: Option<[u32; 2]>,
 
     /// Clip sizes, with commas between them
-    #[arg(long, value_name = "N,...", value_parser = view_values::clip_size, value_delimiter = ',')]
+    #[arg(long, value_name = "N,...", value_parser = view_values::fixed_clip_size, value_delimiter = ',')]
     #[arg(allow_negative_numbers = true)]
     pub(in crate::cli) clip_size: Option<Vec<i64>>,
 
