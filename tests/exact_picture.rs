@@ -4,6 +4,7 @@
 //! are its own, and textures are filtered with as few as 8 bits of a share. On lavapipe (Mesa 22.3.6) over smooth light
 //! all pixels but those at silhouettes are within 1 of 255; [`LIGHT_SLACK`] is for light that jumps from sample to sample.
 #![cfg(feature = "gpu")]
+#![allow(clippy::print_stderr, reason = "says what it found")]
 
 mod support;
 #[path = "support/surfaces.rs"]
@@ -164,6 +165,6 @@ fn pixels_are_those_of_the_exact_image() {
         controls.iter().all(|share| *share > 0.05),
         "seed {seed}: controls {controls:?}"
     );
-    println!("exact image against {}: at least {worst_db:.1} dB", gpu.info.name);
+    eprintln!("exact image against {}: at least {worst_db:.1} dB", gpu.info.name);
     assert!(worst_db > 45.0, "{worst_db} dB");
 }

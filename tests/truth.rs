@@ -1,4 +1,5 @@
 //! The fast caster over `S0`: hit for hit as the plain one, and closed forms.
+#![allow(clippy::print_stderr, reason = "says what it found")]
 
 mod support;
 #[path = "support/surfaces.rs"]
@@ -177,7 +178,7 @@ fn a_plane_is_met_where_it_is() {
             (along > 0.0 && on).then_some(along)
         });
         assert!(hits > 3000, "{hits}");
-        println!("plane: off by {worst:.1e} of the distance at most, {hits} rays");
+        eprintln!("plane: off by {worst:.1e} of the distance at most, {hits} rays");
         assert!(worst < 1e-12, "{worst:e} of the distance, from {eye:?}");
     }
 }
@@ -228,7 +229,7 @@ fn a_single_spike_is_met_where_it_is() {
     ] {
         let (worst, hits) = deviation(&spike, camera(eye, target), form);
         assert!(hits > 3000, "{hits}");
-        println!("spike: off by {worst:.1e} of the distance at most, {hits} rays");
+        eprintln!("spike: off by {worst:.1e} of the distance at most, {hits} rays");
         assert!(worst < 1e-11, "{worst:e} of the distance, from {eye:?}");
     }
 }
@@ -261,7 +262,7 @@ fn a_cone_is_met_as_nearly_as_triangles_can_be() {
         (along.is_finite() && at.y < 0.0 && (300.0..1900.0).contains(&r)).then_some(along)
     });
     assert!(hits > 3000, "{hits}");
-    println!("cone: off by {worst:.1e} of the distance at most, {hits} rays");
+    eprintln!("cone: off by {worst:.1e} of the distance at most, {hits} rays");
     // Heights differ by at most 50 / (8 * 300) m, a chord of a diagonal's length at radius 300; along rays that meet the cone
     // at some angle, three times that, of at least 700 m.
     assert!(
