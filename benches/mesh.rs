@@ -21,7 +21,7 @@ use clipscape::gpu::Gpu;
 use clipscape::grid::Grid;
 use clipscape::levels::Levels;
 use clipscape::progress::Silent;
-use clipscape::pyramid::{DEFAULT_LOBES, Pyramid};
+use clipscape::pyramid::{Filter, Pyramid};
 use clipscape::render::Headless;
 use clipscape::source::Synth;
 use clipscape::{Error, ErrorKind, Result};
@@ -299,7 +299,7 @@ fn run(rounds: usize, side: i64, size_px: [u32; 2]) -> Result<()> {
         let advice = format!("give {} to {GREATEST_SIZE}", STRIP_ROWS + 1);
         return Err(Error::new(ErrorKind::Misuse, "size", what).advice(advice));
     }
-    let pyramid = clipscape::build::build_pyramid(&Synth::new(side, 7)?, DEFAULT_LOBES, &Silent)?;
+    let pyramid = clipscape::build::build_pyramid(&Synth::new(side, 7)?, &Filter::default(), &Silent)?;
     let gpu = clipscape::gpu::open()?;
     let mut headless = Headless::new(gpu.clone(), &pyramid, &options(size_px, true))?;
     let mesh = Mesh::new(&gpu, &pyramid, &headless)?;
