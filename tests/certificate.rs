@@ -19,9 +19,8 @@ use clipscape::build::Threads;
 use clipscape::camera::View;
 use clipscape::clipmap::{Clipmap, ClipmapOptions, Drawn, Terms, certify, certify_by};
 use clipscape::levels::Levels;
-use clipscape::query::{Picker, S0, Surface};
+use clipscape::query::{Picker, S0};
 use clipscape::work::each_chunk;
-use glam::DVec3;
 use support::scenes::{self, camera, dems};
 use support::{Random, seed};
 
@@ -48,12 +47,6 @@ fn measured_px(levels: &dyn Levels, clipmap: &Clipmap, view: &View) -> Option<f6
     let (drawn, truth) = (Drawn::new(clipmap).unwrap(), S0::new(levels));
     let mut picker = Picker::new(&drawn, view).unwrap();
     let scale = clipmap.vertical_scale();
-    let place = |x: f64, y: f64, z: f64| {
-        let p = DVec3::new(x - view.eye.x, (y - view.eye.y) * scale, z - view.eye.z);
-        let [x, y, w] = view.clip_rows().map(|row| row.dot(p));
-        let half = view.size_px.map(|s| f64::from(s) / 2.0);
-        (w > 0.0).then(|| [x / w * half[0], y / w * half[1]])
-    };
     let mut worst = None;
     for row in 0..RAYS[1] {
         for column in 0..RAYS[0] {
@@ -63,15 +56,10 @@ fn measured_px(levels: &dyn Levels, clipmap: &Clipmap, view: &View) -> Option<f6
             let Some(hit) = picker.cast(pixel).unwrap() else {
                 continue;
             };
-            let p = view.eye + view.ray(pixel) * hit.along * DVec3::new(1.0, 1.0 / scale, 1.0);
-            let Some(y) = truth.height_at(p.x, p.z).unwrap() else {
+            let Some(error_px) = scenes::error_px(&truth, view, scale, pixel, hit.along) else {
                 continue;
             };
-            let a = place(p.x, p.y, p.z);
-            let error_px = match (a, place(p.x, y, p.z)) {
-                (Some(a), Some(b)) => ((a[0] - b[0]).hypot(a[1] - b[1]) - ROUNDING_PX).max(0.0),
-                _ => f64::INFINITY,
-            };
+            let error_px = (error_px - ROUNDING_PX).max(0.0);
             worst = Some(error_px.max(worst.unwrap_or(0.0)));
         }
     }

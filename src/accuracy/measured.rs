@@ -126,7 +126,7 @@ fn at_pixel(
     let (grid, scale) = (truth.grid(), truth.vertical_scale());
     let up = (height_m - probe.eye().height_m) * scale;
     let gap_m = if scale == 0.0 { point.y } else { point.y - up };
-    let rounding = Rounding::new(truth, view, &under.crossing(away_m, height_m), pixel);
+    let rounding = Rounding::new(truth, view, &under.crossing(away_m, height_m), pixel, depth);
     let across = [[1.0, 0.0], [0.0, 1.0]].map(|[dx, dy]| view.ray([pixel[0] + dx, pixel[1] + dy]) - ray);
     let shift_m = (across[0].length() + across[1].length()) * rounding.place_px * away_m;
     let mut floor_m = 0.0f64;
@@ -180,7 +180,7 @@ struct Rounding {
 
 impl Rounding {
     /// That of the triangle of `S0` that is crossed.
-    fn new(truth: &Truth<'_>, view: &View, crossing: &Crossing, pixel: [f64; 2]) -> Self {
+    fn new(truth: &Truth<'_>, view: &View, crossing: &Crossing, pixel: [f64; 2], depth: f64) -> Self {
         let facet = Facet::new(truth.grid(), view, truth.vertical_scale(), crossing, pixel);
         match facet {
             // Its plane goes through the eye: depths at one place do not matter.
@@ -189,7 +189,7 @@ impl Rounding {
                 place_px: RASTER_PX,
             },
             Some(f) => Self {
-                depth: f.depth_rounding,
+                depth: depth * (f.vertex_rounding_m / crossing.along + 1.0 / (1u64 << 22) as f64),
                 place_px: f.place_rounding_px,
             },
         }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use clipscape::build::Threads;
-use clipscape::camera::Camera;
+use clipscape::camera::{Camera, View};
 use clipscape::grid::Grid;
 use clipscape::levels::Levels;
 use clipscape::progress::Silent;
@@ -89,6 +89,23 @@ pub fn white_noise(voids: bool) -> Pyramid {
     let mut pyramid = Pyramid::new(grid, heights.collect(), None, &filter, &threads, &Silent).unwrap();
     pyramid.bound(&threads, &Silent).unwrap();
     pyramid
+}
+
+/// How far on the screen the point of a pixel's ray at `along` metres along the view axis lies from the DEM's own surface
+/// over the same place, in pixels; none where that has a hole. Heights are drawn times `scale`.
+pub fn error_px(truth: &S0<'_>, view: &View, scale: f64, pixel: [f64; 2], along: f64) -> Option<f64> {
+    let place = |p: DVec3| {
+        let drawn = (p - view.eye) * DVec3::new(1.0, scale, 1.0);
+        let [x, y, w] = view.clip_rows().map(|row| row.dot(drawn));
+        let half = view.size_px.map(|s| f64::from(s) / 2.0);
+        (w > 0.0).then(|| [x / w * half[0], y / w * half[1]])
+    };
+    let p = view.eye + view.ray(pixel) * along * DVec3::new(1.0, 1.0 / scale, 1.0);
+    let height_m = truth.height_at(p.x, p.z).unwrap()?;
+    Some(match (place(p), place(DVec3::new(p.x, height_m, p.z))) {
+        (Some(a), Some(b)) => (a[0] - b[0]).hypot(a[1] - b[1]),
+        _ => f64::INFINITY,
+    })
 }
 
 /// A camera: 30 % within 50 m of the ground, pitch from -90 to +10 degrees, all headings, over the DEM and a little off it.
