@@ -14,6 +14,8 @@ mod preprocess;
 mod progress;
 #[cfg(feature = "gpu")]
 mod render;
+#[cfg(feature = "gpu")]
+mod shots;
 mod suspects;
 #[cfg(feature = "dem")]
 mod synth;

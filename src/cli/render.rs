@@ -4,32 +4,24 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
-
 use super::Outcome;
 use super::args::{RenderArgs, ViewArgs};
 use super::input::{beside, first};
 use super::progress::Terminal;
+use super::shots::{Planned, Shots, camera};
 use super::view_values::ClipSize;
 use crate::build::{Output, refuse_existing};
-use crate::camera::{Camera, CrsFlight, Flight, View, check_picture, is_crs, overview};
+use crate::camera::{Flight, check_picture, overview};
 use crate::clipmap::{ClipmapOptions, fit_clip_size, height_range_m};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu;
 use crate::grid::Grid;
 use crate::levels::Levels;
 use crate::progress::Progress;
-use crate::query::Places;
 use crate::render::{Headless, HeadlessOptions, Recording, picture};
 use crate::source;
 use crate::stats::{FrameStats, PooledErrors, Run, SummaryStats};
 use crate::stream::Terrain;
-
-/// Vertical field of view where none is given, degrees.
-const FOV_DEG: f64 = 60.0;
-
-/// Metres above the ground where none are given: about a person's eyes.
-const ABOVE_M: f64 = 2.0;
 
 /// Clip size where none is given and the camera is among the terrain.
 const CLIP_SIZE: i64 = 256;
@@ -142,12 +134,6 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     Ok(())
 }
 
-/// What is drawn.
-enum Shots {
-    Flight(Flight),
-    Still(Camera),
-}
-
 /// The smallest clip size that keeps the promised error in all frames.
 fn fitting_clip_size(
     args: &RenderArgs,
@@ -156,18 +142,7 @@ fn fitting_clip_size(
     clipmap: &ClipmapOptions,
     terminal: &Terminal,
 ) -> Result<i64> {
-    let cameras: Vec<Camera> = match shots {
-        Shots::Still(camera) => vec![*camera],
-        Shots::Flight(flight) => {
-            let frames = args.frames.clone().unwrap_or(0..flight.frame_count());
-            frames.map(|k| flight.camera_at_frame(k)).collect()
-        }
-    };
-    let views: Vec<View> = cameras
-        .into_iter()
-        .map(|camera| View::new(camera, args.view.size))
-        .collect::<Result<_>>()?;
-    let fit = fit_clip_size(terrain, &views, clipmap, terminal)?;
+    let fit = fit_clip_size(terrain, &shots.views(args)?, clipmap, terminal)?;
     terminal.note(&format!("clip size {}", fit.clip_size));
     Ok(fit.clip_size)
 }
@@ -260,63 +235,6 @@ pub(super) fn read_flight(path: &Path) -> Result<(String, String)> {
         _ => Error::io(&name, e),
     })?;
     Ok((name, json))
-}
-
-/// A flight before the terrain is open.
-enum Planned {
-    World(Flight),
-    Crs(CrsFlight),
-}
-
-impl Planned {
-    fn parse(name: &str, json: &str) -> Result<Self> {
-        if is_crs(json) {
-            CrsFlight::parse(name, json).map(Self::Crs)
-        } else {
-            Flight::parse(name, json).map(Self::World)
-        }
-    }
-
-    /// Its times; places in a reference system are not known yet.
-    fn times(&self) -> &Flight {
-        match self {
-            Self::World(flight) => flight,
-            Self::Crs(flight) => flight.times(),
-        }
-    }
-
-    fn over(self, terrain: &Terrain) -> Result<Flight> {
-        match self {
-            Self::World(flight) => Ok(flight),
-            Self::Crs(flight) => {
-                let places = Places::new(terrain, terrain.place(), terrain.name())?;
-                flight.resolve(|key| places.above(key.at, key.above_m).map(|eye| eye.to_array()))
-            }
-        }
-    }
-}
-
-/// The camera that is asked for, if one is.
-fn camera(args: &RenderArgs, terrain: &Terrain) -> Result<Option<Camera>> {
-    let places = || Places::new(terrain, terrain.place(), terrain.name());
-    let eye: DVec3 = match (args.eye, args.eye_at) {
-        (Some(eye), _) => eye.into(),
-        (None, Some(at)) => places()?.above(at, args.above.unwrap_or(ABOVE_M))?,
-        (None, None) => return Ok(None),
-    };
-    let (mut heading_deg, mut pitch_deg) = (args.heading.unwrap_or(0.0), args.pitch.unwrap_or(0.0));
-    if let Some(at) = args.look_at {
-        // As drawn: directions are those of the scaled world.
-        let drawn = DVec3::new(1.0, args.view.vertical_scale, 1.0);
-        (heading_deg, pitch_deg) = Camera::toward(eye * drawn, places()?.ground(at)? * drawn);
-    }
-    Ok(Some(Camera {
-        eye,
-        heading_deg,
-        pitch_deg,
-        roll_deg: args.roll.unwrap_or(0.0),
-        fov_deg: args.fov.unwrap_or(FOV_DEG),
-    }))
 }
 
 /// The clip size asked for, or one that suits the picture.
