@@ -27,7 +27,7 @@
 //! ground it is measured from never falls, see [`super::Clipmap`]). From `T <= N/4 - 10` and `R = N/2 - 2`:
 //! `R - T >= N/4 + 8`, and `R/2 + 8 = N/4 + 7`: a whole step to spare, so the ring of level `l + 1` is selected 0.
 //! For the held field, (c) rests on the order in which patches fade in, see [`super::HeldField`], and on the nesting of
-//! need, see [`super::need`]: children are drawn where a corner has both below 1, and each by itself makes its share 0.
+//! need, see `need.rs`: children are drawn where a corner has both below 1, and each by itself makes its share 0.
 //!
 //! From (b) and (c): neighbours differ by one level at most, and what the finer morphs towards is what is drawn.
 

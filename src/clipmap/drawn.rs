@@ -138,7 +138,7 @@ impl<'a> Drawn<'a> {
     /// The surface that `clipmap` draws.
     ///
     /// # Errors
-    /// [`ErrorKind::Misuse`] where it was never updated, or its last update failed.
+    /// [`crate::ErrorKind::Misuse`] where it was never updated, or its last update failed.
     pub fn new(clipmap: &'a Clipmap) -> Result<Self> {
         let Some(scene) = clipmap.scene() else {
             return Err(no_frame("whose surface could be queried"));
