@@ -33,7 +33,7 @@ use support::{Random, gpu, seed};
 /// What f64 may lose between a hit and its place on the screen, in pixels.
 const ROUNDING_PX: f64 = 1e-6;
 
-const SIZE_PX: [u32; 2] = [640, 360];
+const SIZE_PX: [u32; 2] = [320, 180];
 
 fn options(random: &mut Random) -> ClipmapOptions {
     let clip_size = random.pick(&[64, 128, 256]);
