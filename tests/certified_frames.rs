@@ -11,6 +11,9 @@
 //!
 //! `CLIPSCAPE_SEED` sets the seed.
 //!
+//! Of those 5,000 two break it, frame 746 of seed 51 over Mt Hood and over the Sierra: one pixel each measures 0.03 px where all
+//! is drawn at full resolution, nearer than any ray around it meets the ground.
+//!
 //! *Second look.* Beside triangles seen edge on, and on slivers, f32 moves a depth by more than the floor allows for, which
 //! knows the DEM's triangles and not the drawn ones: about one pixel in a million measures some hundredths of a pixel
 //! where nothing is wrong. So a pixel that measures more than was certified is looked at again: if its depth is that of
