@@ -130,6 +130,11 @@ impl HeldField {
 
     /// Sets a corner to a value in 0 to 1, until the next update.
     pub fn set_corner(&mut self, level: u32, x: i64, z: i64, value: f32) {
+        self.quiet &= value <= 0.0;
+        self.write_corner(level, x, z, value);
+    }
+
+    fn write_corner(&mut self, level: u32, x: i64, z: i64, value: f32) {
         let index = self.index(x, z);
         let level = &mut self.levels[level as usize];
         let value = value.clamp(0.0, 1.0);
@@ -248,7 +253,7 @@ impl HeldField {
                 .fold(0.0, f32::max);
             let index = self.index(x, z);
             self.levels[level as usize].faded[index] = value;
-            self.set_corner(level, x, z, value);
+            self.write_corner(level, x, z, value);
         }
     }
 
@@ -271,7 +276,7 @@ impl HeldField {
                         self.needs[((b - patches.z0) * patches.width() + (a - patches.x0)) as usize]
                     })
                     .fold(1.0, f32::min);
-                self.set_corner(level, x, z, need.max(self.faded(level, x, z)));
+                self.write_corner(level, x, z, need.max(self.faded(level, x, z)));
             }
         }
     }

@@ -263,7 +263,8 @@ impl Scene<'_> {
         };
         let ground = distance(patch.a, 0).max(distance(patch.b, 1)) / (1i64 << finer) as f64;
         let d = ground.max(f64::from(self.levels[finer as usize].climb));
-        d < self.ring.reach() as f64 + MARGIN && self.held.least(finer, patch.a, patch.b) < 1.0
+        d < self.ring.reach() as f64 + MARGIN
+            && (self.held.is_quiet() || self.held.least(finer, patch.a, patch.b) < 1.0)
     }
 
     /// Whether all of a patch of the coarsest level is there: else nothing could be drawn in its place.
@@ -275,7 +276,8 @@ impl Scene<'_> {
     fn may_reach_1(&self, patch: Patch) -> bool {
         let parent = patch.parent();
         self.distances(patch)[1] > self.ring.reach() as f64 - MARGIN
-            || f64::from(self.held.greatest(patch.level, parent.a, parent.b)) > 1.0 - MARGIN
+            || (!self.held.is_quiet()
+                && f64::from(self.held.greatest(patch.level, parent.a, parent.b)) > 1.0 - MARGIN)
     }
 
     /// Whether alpha may be other than 0 somewhere on a patch that is drawn; with a margin for what the shader rounds.
@@ -284,7 +286,7 @@ impl Scene<'_> {
         let start = (self.ring.reach() - self.ring.transition) as f64;
         self.has_coarser(patch.level)
             && (self.distances(patch)[1] > start - MARGIN
-                || self.held.greatest(patch.level, parent.a, parent.b) > 0.0)
+                || (!self.held.is_quiet() && self.held.greatest(patch.level, parent.a, parent.b) > 0.0))
     }
 
     /// The least and the greatest `d` on a patch, in steps of its level.
