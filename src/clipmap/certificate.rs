@@ -227,7 +227,7 @@ impl<'a> Frame<'a> {
         let (e, f) = (error(own), error(parent));
         let steep = alphas.across > STEEP;
         let morphed = if steep || own.voids || parent.voids || self.scene.over_the_edge(patch) {
-            self.by_triangles(patch, e, f, own)
+            self.by_triangles(patch, e, f, own)?
         } else {
             let covariance = alphas.across * (e + f) / 2.0;
             blend(e, f, alphas) + if self.terms.covariance { covariance } else { 0.0 }
@@ -239,8 +239,8 @@ impl<'a> Frame<'a> {
         Some(morphed + f64::from(greatest) * 2f64.powi(-22))
     }
 
-    /// The same by the patch's triangles and the windows' samples.
-    fn by_triangles(&self, patch: Patch, e: f64, f: f64, own: &PatchInfo) -> f64 {
+    /// The same by the patch's triangles and the windows' samples; none where one that counts has not arrived.
+    fn by_triangles(&self, patch: Patch, e: f64, f: f64, own: &PatchInfo) -> Option<f64> {
         let truth = [own.bounds.need_min, own.bounds.need_max].map(f64::from);
         let corners: [[Option<Corner>; SIDE]; SIDE] =
             std::array::from_fn(|z| std::array::from_fn(|x| self.corner(patch, x as i64, z as i64)));
@@ -250,13 +250,13 @@ impl<'a> Frame<'a> {
                 for third in [corners[z][x + 1], corners[z + 1][x]] {
                     let triangle = match (corners[z][x], third, corners[z + 1][x + 1]) {
                         (Some(nw), Some(third), Some(se)) => [nw, third, se],
-                        _ => return f64::INFINITY,
+                        _ => return None,
                     };
                     worst = worst.max(self.triangle_m(&triangle, e, f, truth));
                 }
             }
         }
-        worst
+        Some(worst)
     }
 
     fn triangle_m(&self, corners: &[Corner; 3], e: f64, f: f64, truth: [f64; 2]) -> f64 {
