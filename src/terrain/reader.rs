@@ -32,6 +32,8 @@ pub struct TerrainFile {
     meta: Meta,
     layout: Layout,
     tables: Vec<Vec<u64>>,
+    /// Of a file in the making the checks so far, as its writer keeps them; else empty.
+    checks: Vec<Vec<[u32; 2]>>,
     cache: Cache,
 }
 
@@ -63,10 +65,31 @@ impl TerrainFile {
             meta,
             layout,
             tables,
+            checks: Vec::new(),
             cache,
         };
         file.check_end()?;
         Ok(file)
+    }
+
+    /// A file in the making: the tiles that its tables know of, checked by what its writer kept.
+    pub(super) fn unfinished(
+        name: &str,
+        bytes: Arc<dyn ReadAt>,
+        meta: Meta,
+        layout: Layout,
+        tables: Vec<Vec<u64>>,
+        checks: Vec<Vec<[u32; 2]>>,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            bytes,
+            meta,
+            layout,
+            tables,
+            checks,
+            cache: Cache::new(DEFAULT_CACHE_BYTES),
+        }
     }
 
     /// The same with a cache of another size, in bytes of decoded tiles.
@@ -202,6 +225,10 @@ impl TerrainFile {
 
     /// One value of a check part.
     fn check_value(&self, part: usize, x: i64, z: i64, channel: usize) -> Result<u32> {
+        if let Some(checks) = self.checks.get(part) {
+            let width = self.layout.parts()[part].size.width;
+            return Ok(checks[(z * width + x) as usize][channel]);
+        }
         let at = Rect::new(x, z, x + 1, z + 1);
         let (tx, ty) = (x / super::layout::TILE, z / super::layout::TILE);
         let tile = self.tile(part, tx, ty)?;
