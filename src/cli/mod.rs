@@ -72,6 +72,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 enum Failure {
     /// Something is wrong: it is said in one line.
     Error(Error),
+    /// Flags that do not go together: it is said in one line.
+    Usage(Error),
     /// All has been said already.
     Said,
     /// Whoever read standard output has stopped reading, which is their right.
@@ -91,6 +93,10 @@ fn status(outcome: Outcome) -> u8 {
     match outcome {
         Ok(()) | Err(Failure::BrokenPipe) => DONE_STATUS,
         Err(Failure::Said) => FAILED_STATUS,
+        Err(Failure::Usage(error)) => {
+            say(&error.to_string());
+            USAGE_STATUS
+        }
         Err(Failure::Error(error)) => {
             say(&error.to_string());
             if error.kind() == ErrorKind::Cancelled {

@@ -4,12 +4,12 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::Outcome;
 use super::args::{RenderArgs, ViewArgs};
 use super::input::{beside, first};
 use super::progress::Terminal;
 use super::shots::{Planned, Shots, camera};
 use super::view_values::ClipSize;
+use super::{Failure, Outcome};
 use crate::build::{Output, refuse_existing};
 use crate::camera::{Flight, check_picture, overview};
 use crate::clipmap::{ClipmapOptions, fit_clip_size, height_range_m};
@@ -56,7 +56,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         (None, false) if !args.force => refuse_existing(&out)?,
         (None, false) => {}
     }
-    let mut clipmap = clipmap_options(args)?;
+    let mut clipmap = clipmap_options(args).map_err(Failure::Usage)?;
     let stats = args
         .view
         .stats
