@@ -73,6 +73,7 @@ enum Failure {
     /// Something is wrong: it is said in one line.
     Error(Error),
     /// Flags that do not go together: it is said in one line.
+    #[cfg(feature = "gpu")]
     Usage(Error),
     /// All has been said already.
     Said,
@@ -93,6 +94,7 @@ fn status(outcome: Outcome) -> u8 {
     match outcome {
         Ok(()) | Err(Failure::BrokenPipe) => DONE_STATUS,
         Err(Failure::Said) => FAILED_STATUS,
+        #[cfg(feature = "gpu")]
         Err(Failure::Usage(error)) => {
             say(&error.to_string());
             USAGE_STATUS
