@@ -433,7 +433,7 @@ fn render_refuses_at_once_what_it_could_only_spoil() {
     let huge = grid.replace('6', "-1e38");
     fs::write(folder.path().join("huge.asc"), huge).unwrap();
     if clipscape::gpu::open().is_ok() {
-        let says = ["huge.asc: has heights of -1e38 m", "--nodata"];
+        let says = ["huge.asc: has heights of -1.0e38 m", "--nodata"];
         fails(folder.path(), 1, &["render", "huge.asc", "-o", "b.png"], &says);
     }
     fs::remove_file(folder.path().join("huge.asc")).unwrap();

@@ -302,7 +302,7 @@ fn check_heights(terrain: &Terrain, low: f64, high: f64) -> Result<()> {
     if most.abs() <= MAX_EYE_M / 8.0 {
         return Ok(());
     }
-    let what = format!("has heights of {most:e} m as drawn, too far up or down for a view of the whole");
+    let what = format!("has heights of {most:.1e} m as drawn, too far up or down for a view of the whole");
     Err(Error::new(ErrorKind::Limit, terrain.name(), what).advice(
         "if they stand for no data, name their value with --nodata; else place the camera with --eye",
     ))
