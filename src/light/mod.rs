@@ -1,6 +1,6 @@
 //! Light on the terrain: the sun's share and the sky's share of every sample, traced over the DEM's surface.
 //!
-//! `horizon` finds how high the terrain stands in a direction, `sun` and `sky` make light of it, `fill`
+//! `rays` and `relief` find how high the terrain stands in a direction, `sun` and `sky` make light of it, `fill`
 //! spreads it under voids, and [`light_levels`] filters it into levels like the heights. All of it is traced
 //! over `S0`, level 0; no data, and what lies beyond the DEM, neither casts a shadow nor blocks the sky.
 //!
@@ -19,6 +19,8 @@ use crate::work::Work;
 mod fill;
 mod horizon;
 mod normal;
+mod rays;
+mod relief;
 mod sky;
 mod sun;
 
