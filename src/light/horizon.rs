@@ -39,13 +39,20 @@ pub fn horizon_tangents(
     let relief = Relief::new(heights, grid);
     let rays = Rays::new(grid, azimuth_deg, f64::INFINITY, 0.0);
     let mut tangents = vec![0.0; heights.len()];
-    each_lanes(&mut tangents, grid, "horizon", work, progress, |[i, j], tangents| {
-        relief.raise(&rays, [i, j], f32::INFINITY, tangents);
-        let here = &heights[j * grid.size.width as usize + i..];
-        for (tangent, h) in tangents.iter_mut().zip(here) {
-            *tangent = if h.is_nan() { f32::NAN } else { *tangent };
-        }
-    })?;
+    each_lanes(
+        &mut tangents,
+        grid,
+        "horizon",
+        work,
+        progress,
+        |[i, j], tangents| {
+            relief.raise(&rays, [i, j], f32::INFINITY, tangents);
+            let here = &heights[j * grid.size.width as usize + i..];
+            for (tangent, h) in tangents.iter_mut().zip(here) {
+                *tangent = if h.is_nan() { f32::NAN } else { *tangent };
+            }
+        },
+    )?;
     Ok(tangents)
 }
 

@@ -42,7 +42,10 @@ impl<'a> Relief<'a> {
         for rows in heights.chunks(STEP * width) {
             let mut highest = vec![f32::NEG_INFINITY; width];
             for row in rows.chunks(width) {
-                highest.iter_mut().zip(row).for_each(|(most, &h)| *most = greater(*most, h));
+                highest
+                    .iter_mut()
+                    .zip(row)
+                    .for_each(|(most, &h)| *most = greater(*most, h));
             }
             blocks.extend(
                 highest
@@ -116,7 +119,9 @@ impl<'a> Relief<'a> {
                 break;
             }
             let could_rise = |most: f32| {
-                (0..L).fold(false, |any, l| any | ((most - h[l]) * run.per_m - run.drop > tangents[l]))
+                (0..L).fold(false, |any, l| {
+                    any | ((most - h[l]) * run.per_m - run.drop > tangents[l])
+                })
             };
             if run.end as usize <= crossings.start {
                 at = run.next as usize;
@@ -147,16 +152,18 @@ impl<'a> Relief<'a> {
                 }
             }
             for tangent in tangents.iter_mut() {
-                *tangent = if *tangent >= until { f32::INFINITY } else { *tangent };
+                *tangent = if *tangent >= until {
+                    f32::INFINITY
+                } else {
+                    *tangent
+                };
             }
         }
     }
 
     /// `L` heights from index `at` on.
     fn lanes<const L: usize>(&self, at: usize) -> &[f32; L] {
-        self.heights[at..at + L]
-            .try_into()
-            .expect("the range is L long")
+        self.heights[at..at + L].try_into().expect("the range is L long")
     }
 }
 
@@ -185,5 +192,7 @@ fn slide(values: &[f32], width: usize, count: usize) -> Vec<f32> {
 /// Rows of `width` as columns.
 fn transposed(values: &[f32], width: usize) -> Vec<f32> {
     let height = values.len() / width;
-    (0..values.len()).map(|at| values[at % height * width + at / height]).collect()
+    (0..values.len())
+        .map(|at| values[at % height * width + at / height])
+        .collect()
 }

@@ -103,5 +103,9 @@ fn arc_cotangent(x: f32) -> f32 {
         1.0,
     ];
     let arc = z * series.iter().fold(0.0, |sum, c| sum * z2 + c);
-    if small { std::f32::consts::FRAC_PI_2 - arc } else { arc }
+    if small {
+        std::f32::consts::FRAC_PI_2 - arc
+    } else {
+        arc
+    }
 }
