@@ -11,7 +11,7 @@ use exr::prelude::Vec2;
 use super::header;
 use super::layout::{Kind, Layout, Part, TileRow};
 use super::meta::Meta;
-use super::reader::TerrainFile;
+use super::reader::{TerrainFile, Unwritten};
 use super::tile::{BOUNDS_FIELDS, LIGHT_FIELDS, check, little_endian, pack};
 use super::zip;
 use crate::error::{Error, ErrorKind, Result};
@@ -253,8 +253,10 @@ impl<W: Write + Seek> TerrainWriter<W> {
             open()?,
             meta.clone(),
             self.layout.clone(),
-            self.tables.clone(),
-            self.checks.clone(),
+            Unwritten {
+                tables: self.tables.clone(),
+                checks: self.checks.clone(),
+            },
         ))
     }
 
