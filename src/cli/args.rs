@@ -96,7 +96,7 @@ pub(super) struct PreprocessArgs {
     #[arg(hide_possible_values = true)]
     pub(super) filter: FilterKind,
 
-    /// Refuse a DEM that needs more memory than this, as in 512M or 2GiB
+    /// Refuse a DEM that needs more memory than this, as in 512M or 2GiB [default: 512M]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes)]
     pub(super) memory: Option<u64>,
 
