@@ -5,14 +5,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::Outcome;
 use super::args::{RenderArgs, ViewArgs};
 use super::input::{beside, first};
 use super::progress::Terminal;
 use super::shots::{Planned, Shots, camera};
 use super::view_values::ClipSize;
+use super::{Failure, Outcome};
 use crate::build::{Output, refuse_existing};
-use crate::camera::{Flight, check_picture, overview};
+use crate::camera::{Flight, MAX_EYE_M, check_picture, overview};
 use crate::clipmap::{ClipmapOptions, Wait, fit_clip_size, height_range_m};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu;
@@ -62,7 +62,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         (None, false) if !args.force => refuse_existing(&out)?,
         (None, false) => {}
     }
-    let mut clipmap = clipmap_options(args)?;
+    let mut clipmap = clipmap_options(args).map_err(Failure::Usage)?;
     let tiles = tile_options(&args.view)?;
     let stats = args
         .view
@@ -81,6 +81,9 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     let heights = height_range_m(terrain.as_ref())?.map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
     let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
     let aspect = f64::from(args.view.size[0]) / f64::from(args.view.size[1]);
+    if camera.is_none() && flight.is_none() {
+        check_heights(&terrain, low, high)?;
+    }
     let shots = match (flight, args.flight.is_some(), camera) {
         (Some(flight), ..) => Shots::Flight(flight),
         (None, true, _) => Shots::Flight(Flight::orbit(terrain.grid(), low, high).scaled_down(scale)?),
@@ -392,6 +395,18 @@ fn headless_options(view: &ViewArgs, terrain: &Terrain, clipmap: &ClipmapOptions
         sun,
         clipmap: *clipmap,
     }
+}
+
+/// Refuses to look for a place from which heights beyond any camera's would be seen: most often they stand for no data.
+fn check_heights(terrain: &Terrain, low: f64, high: f64) -> Result<()> {
+    let most = if -low > high { low } else { high };
+    if most.abs() <= MAX_EYE_M / 8.0 {
+        return Ok(());
+    }
+    let what = format!("has heights of {most:.1e} m as drawn, too far up or down for a view of the whole");
+    Err(Error::new(ErrorKind::Limit, terrain.name(), what).advice(
+        "if they stand for no data, name their value with --nodata; else place the camera with --eye",
+    ))
 }
 
 fn warn_of_sun(args: &RenderArgs, terrain: &Terrain, terminal: &Terminal) {

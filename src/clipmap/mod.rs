@@ -23,6 +23,7 @@ mod plan;
 mod relief;
 mod screen;
 mod selection;
+mod stray;
 mod vertex;
 mod window;
 

@@ -8,16 +8,12 @@
 
 use std::sync::Arc;
 
-use exr::block::UncompressedBlock;
-use exr::block::chunk::{Chunk, CompressedBlock, CompressedTileBlock, TileCoordinates};
-use exr::meta::MetaData;
-use exr::prelude::Vec2;
-
 use super::cache::Cache;
 use super::header;
 use super::layout::{Kind, Layout, Part};
 use super::meta::Meta;
-use super::tile::{BOUNDS_FIELDS, LIGHT_FIELDS, check, unpack};
+use super::tile::{BOUNDS_FIELDS, LIGHT_FIELDS, check, little_endian, unpack};
+use super::zip;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
 use crate::levels::{Arrival, Bounds, Levels, LightSample};
@@ -42,7 +38,6 @@ pub struct TerrainFile {
     bytes: Arc<dyn ReadAt>,
     meta: Meta,
     layout: Layout,
-    exr: MetaData,
     /// Where each part's offset table begins.
     tables_at: Vec<u64>,
     pages: Cache,
@@ -57,7 +52,6 @@ impl TerrainFile {
     /// file or one of another version, and what `bytes` meet.
     pub fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Self> {
         let (meta, layout, tables_at) = header::read(name, bytes.clone())?;
-        let exr = header::describe(&layout);
         // The header's reader has made sure that the file is long enough for all tables.
         let starts = layout.parts().iter().scan(tables_at, |at, part| {
             let start = *at;
@@ -71,7 +65,6 @@ impl TerrainFile {
             bytes,
             meta,
             layout,
-            exr,
             tables_at,
             pages: Cache::new(PAGES_BYTES),
             cache,
@@ -209,24 +202,14 @@ impl TerrainFile {
         self.bytes
             .read_exact_at(at, &mut compressed)
             .map_err(|e| self.unread(part, x, y, e))?;
-        let coordinates = TileCoordinates {
-            tile_index: Vec2(x as usize, y as usize),
-            level_index: Vec2(0, 0),
-        };
-        let block = CompressedTileBlock {
-            coordinates,
-            compressed_pixels_le: compressed,
-        };
-        let chunk = Chunk {
-            layer_index: part,
-            compressed_block: CompressedBlock::Tile(block),
-        };
-        let tile = UncompressedBlock::decompress_chunk(chunk, &self.exr, true)
-            .map_err(|e| self.broken(part, x, y, format!("cannot be decoded ({e})")))?
-            .data;
+        let description = &self.layout.parts()[part];
+        let most = description.bytes(description.tile_rect(x, y));
+        let tile = zip::decompress(compressed, most)
+            .map_err(|e| self.broken(part, x, y, format!("cannot be decoded ({e})")))?;
+        let tile = little_endian(tile, description.sample_bytes());
         if let Some(at) = self.layout.check_of(part, x, y) {
             let want = self.check_value(at.part, at.x, at.y, at.channel)?;
-            let found = check(&tile, self.layout.parts()[part].sample_bytes());
+            let found = check(&tile, description.sample_bytes());
             if found != want {
                 let place = self.layout.parts()[at.part].name();
                 let what = format!("is damaged: its CRC-32C is {found:08x}, {place} says {want:08x}");

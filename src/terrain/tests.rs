@@ -281,3 +281,49 @@ fn a_file_of_any_size_opens_without_its_index() {
     assert!(read < header_bytes + 50_000, "{read} bytes were read");
     assert!(tables > 300_000_000, "{tables} bytes of tables");
 }
+
+#[test]
+fn the_exr_crate_reads_every_part_as_written() {
+    use exr::prelude::{ReadChannels, ReadLayers, read};
+    for look in [Look::Noise, Look::Smooth] {
+        let arrays = Arrays::random(530, 300, true, look, 21);
+        let image = read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            .from_buffered(Cursor::new(arrays.file()))
+            .unwrap();
+        let layout = Layout::new(&arrays.grid, true).unwrap();
+        assert_eq!(image.layer_data.len(), layout.parts().len());
+        for (layer, part) in image.layer_data.iter().zip(layout.parts()) {
+            let level = part.level as usize;
+            for (index, channel) in layer.channel_data.list.iter().enumerate() {
+                assert_eq!(channel.name.to_string(), part.channels().0[index]);
+                let bits: Vec<u64> = channel
+                    .sample_data
+                    .values_as_f32()
+                    .map(|v| v.to_bits().into())
+                    .collect();
+                let want: Vec<u64> = match part.kind {
+                    layout::Kind::Height => {
+                        arrays.heights[level].iter().map(|h| h.to_bits().into()).collect()
+                    }
+                    layout::Kind::Bounds => {
+                        let field = tile::BOUNDS_FIELDS[index];
+                        let of = |b: &crate::levels::Bounds| bytemuck::cast::<_, [u32; 6]>(*b)[field].into();
+                        arrays.bounds[level].iter().map(of).collect()
+                    }
+                    layout::Kind::Light => {
+                        let all = &arrays.light.as_ref().unwrap()[level];
+                        let of = |l: &crate::levels::LightSample| [l.sky, l.sun][index].to_f32().to_bits();
+                        all.iter().map(|l| of(l).into()).collect()
+                    }
+                    layout::Kind::Check | layout::Kind::CheckBounds => continue,
+                };
+                assert!(bits == want, "{look:?}, {}", part.name());
+            }
+        }
+    }
+}
