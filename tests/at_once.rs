@@ -219,3 +219,50 @@ fn what_was_begun_ends_with_the_terrain() {
         assert!(!name.ends_with(".part"), "{name}");
     }
 }
+
+#[test]
+fn a_dem_that_changes_while_it_is_built_is_said_and_its_draft_flown_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let dem = folder.path().join("N42E001.hgt");
+    let cache = folder.path().join("cache");
+    let cases: [(&str, &dyn Fn()); 3] = [
+        ("cut", &|| {
+            let file = fs::OpenOptions::new().write(true).open(&dem).unwrap();
+            file.set_len(1_000_000).unwrap();
+        }),
+        ("overwritten", &|| {
+            use std::io::Write;
+            let mut file = fs::OpenOptions::new().write(true).open(&dem).unwrap();
+            file.write_all(&[7; 100_000]).unwrap();
+            let later = std::time::SystemTime::now() + Duration::from_secs(5);
+            file.set_modified(later).unwrap();
+        }),
+        ("removed", &|| fs::remove_file(&dem).unwrap()),
+    ];
+    for (case, harm) in cases {
+        fs::copy(DEM, &dem).unwrap();
+        let options = OpenOptions::default();
+        let terrain = Terrain::open_at_once(&[&dem], &options, &at_once(Some(&cache)), &Silent).unwrap();
+        let arriving = terrain.arriving();
+        let mut clipmap = Clipmap::new(&arriving, &OPTIONS).unwrap();
+        clipmap.update(&arriving, &spot(), 0.0).unwrap();
+        // Before it is built: the first frame has the processors for itself.
+        harm();
+        terrain.wait_for_heights(&Silent).unwrap();
+        for k in 1..10 {
+            let report = clipmap.update(&arriving, &spot(), f64::from(k) / 30.0).unwrap();
+            assert!(report.provisional && report.patches > 0, "{case}");
+        }
+        let warnings = terrain.take_warnings();
+        assert!(
+            warnings.len() == 1 && warnings[0].contains("N42E001.hgt: "),
+            "{case}: {warnings:?}"
+        );
+        drop(terrain);
+        assert_eq!(
+            fs::read_dir(&cache).map_or(0, Iterator::count),
+            0,
+            "{case}: what was read is not kept"
+        );
+    }
+}

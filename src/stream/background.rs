@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use super::cache_folder::{CacheFolder, Fingerprint};
 use super::stage::{Current, Stage};
@@ -16,6 +17,9 @@ use crate::light::LightOptions;
 use crate::progress::Progress;
 use crate::source::{self, HeightSource};
 use crate::terrain::TerrainFile;
+
+/// How long the first frame has the processors for itself.
+const HEAD_START: Duration = Duration::from_millis(1500);
 
 /// What a background build is told.
 pub(super) struct Plan {
@@ -44,6 +48,8 @@ struct Shared {
 
 #[derive(Default)]
 struct State {
+    /// Whether somebody waits for it.
+    hurry: bool,
     /// Whether heights are there, or will never be.
     heights_done: bool,
     warnings: Vec<String>,
@@ -55,6 +61,7 @@ impl Background {
         let shared = Arc::new(Shared::default());
         let theirs = shared.clone();
         let work = move || {
+            theirs.give_a_start();
             if let Err(error) = build(&plan, &current, &theirs)
                 && error.kind() != ErrorKind::Cancelled
             {
@@ -81,11 +88,13 @@ impl Background {
     /// [`ErrorKind::Cancelled`].
     pub(super) fn wait_for_heights(&self, progress: &dyn Progress) -> Result<()> {
         let mut state = self.shared.lock();
+        state.hurry = true;
+        self.shared.changed.notify_all();
         while !state.heights_done {
             if progress.cancelled() {
                 return Err(Error::cancelled("the terrain file"));
             }
-            let short = std::time::Duration::from_millis(50);
+            let short = Duration::from_millis(50);
             state = self
                 .shared
                 .changed
@@ -110,6 +119,8 @@ impl Background {
 impl Drop for Background {
     fn drop(&mut self) {
         self.shared.cancelled.store(true, Ordering::Relaxed);
+        self.shared.lock().hurry = true;
+        self.shared.changed.notify_all();
         if let Some(thread) = self.thread.take() {
             // It has said what there was to say.
             let _ = thread.join();
@@ -120,6 +131,16 @@ impl Drop for Background {
 impl Shared {
     fn lock(&self) -> std::sync::MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Lets the first frame have the processors, unless somebody waits for what is to be built.
+    fn give_a_start(&self) {
+        let waits = |state: &mut State| !state.hurry;
+        drop(
+            self.changed
+                .wait_timeout_while(self.lock(), HEAD_START, waits)
+                .unwrap_or_else(PoisonError::into_inner),
+        );
     }
 
     fn heights_done(&self) {

@@ -77,38 +77,40 @@ impl Draft {
         })
     }
 
-    /// The height of sample (i, j) of a level: its own, or that of the drawn-up level's surface there.
-    fn at(&self, level: u32, i: i64, j: i64) -> f32 {
-        let own = |level: u32, i: i64, j: i64| {
-            let size = self.grid.level(level);
-            self.levels[(level - self.first) as usize][(j * size.width + i) as usize]
+    /// The heights of row `j`, from column `i0` on: the level's own, or those of the drawn-up level's surface there.
+    fn row(&self, level: u32, i0: i64, j: i64, out: &mut [f32]) {
+        let own = |level: u32, j: i64| {
+            let width = self.grid.level(level).width;
+            &self.levels[(level - self.first) as usize][(j * width) as usize..][..width as usize]
         };
         if level >= self.first {
-            return own(level, i, j);
+            out.copy_from_slice(&own(level, j)[i0 as usize..][..out.len()]);
+            return;
         }
-        // The triangle of the drawn-up level that holds it, and its place there.
-        let steps = 1i64 << (self.first - level);
-        let (a, b) = (i / steps, j / steps);
-        let (u, v) = (
-            (i % steps) as f32 / steps as f32,
-            (j % steps) as f32 / steps as f32,
-        );
-        let corner = |da: i64, db: i64| own(self.first, a + da, b + db);
-        let weighted: [(f32, i64, i64); 3] = if u >= v {
-            [(1.0 - u, 0, 0), (u - v, 1, 0), (v, 1, 1)]
-        } else {
-            [(1.0 - v, 0, 0), (v - u, 0, 1), (u, 1, 1)]
-        };
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for (w, da, db) in weighted.into_iter().filter(|(w, ..)| *w > 0.0) {
-            let height = corner(da, db);
-            if !height.is_nan() {
-                sum += w * height;
-                weight += w;
-            }
+        // The triangle of the drawn-up level that holds a sample, and its place there.
+        let shift = self.first - level;
+        let last = self.grid.level(self.first).height - 1;
+        let north = own(self.first, j >> shift);
+        let south = own(self.first, ((j >> shift) + 1).min(last));
+        let whole = 1i64 << shift;
+        let scale = 1.0 / whole as f32;
+        let v = (j & (whole - 1)) as f32 * scale;
+        for (i, out) in (i0..).zip(out) {
+            let (a, u) = ((i >> shift) as usize, (i & (whole - 1)) as f32 * scale);
+            let east = (a + 1).min(north.len() - 1);
+            let (side, weights) = if u >= v {
+                (north[east], [1.0 - u, u - v, v])
+            } else {
+                (south[a], [1.0 - v, v - u, u])
+            };
+            let corners = [north[a], side, south[east]];
+            let sum: f32 = corners.iter().zip(weights).map(|(h, w)| h * w).sum();
+            *out = if sum.is_nan() {
+                without_voids(corners, weights)
+            } else {
+                sum
+            };
         }
-        // Where a corner is void the others go on: the DEM may have data there.
-        if weight > 0.0 { sum / weight } else { f32::NAN }
     }
 
     fn check(&self, level: u32, rect: Rect, size: Size, places: usize) -> Result<()> {
@@ -128,8 +130,10 @@ impl Levels for Draft {
 
     fn heights(&self, level: u32, rect: Rect, out: &mut [f32]) -> Result<Arrival> {
         self.check(level, rect, self.grid.level(level), out.len())?;
-        for ((i, j), out) in rect.cells().zip(out) {
-            *out = self.at(level, i, j);
+        if !rect.is_empty() {
+            for (j, row) in (rect.z0..).zip(out.chunks_exact_mut(rect.width() as usize)) {
+                self.row(level, rect.x0, j, row);
+            }
         }
         Ok(Arrival::Arrived)
     }
@@ -137,19 +141,30 @@ impl Levels for Draft {
     fn bounds(&self, level: u32, patches: Rect, out: &mut [Bounds]) -> Result<Arrival> {
         self.check(level, patches, self.grid.patches(level), out.len())?;
         let [need_min, need_max] = self.range_m;
-        for ((a, b), out) in patches.cells().zip(out) {
-            let samples = Patch::new(level, a, b).samples_within(self.grid.level(level));
-            let heights: Vec<f32> = samples.cells().map(|(i, j)| self.at(level, i, j)).collect();
-            let [min, max] = range(heights.iter());
-            // How far it is off, nobody knows: detail is never left out.
-            *out = Bounds {
-                min,
-                max,
-                error: if min.is_nan() { f32::NAN } else { f32::MAX },
-                need_min,
-                need_max,
-                need_error: if need_min.is_nan() { f32::NAN } else { f32::MAX },
-            };
+        let size = self.grid.level(level);
+        let mut band = Vec::new();
+        for (b, row) in (patches.z0..patches.z1).zip(out.chunks_exact_mut(patches.width().max(1) as usize)) {
+            // The samples of a row of patches.
+            let first = Patch::new(level, patches.x0, b).samples_within(size);
+            let last = Patch::new(level, patches.x1 - 1, b).samples_within(size);
+            let samples = Rect { x1: last.x1, ..first };
+            band.resize(samples.area() as usize, 0.0);
+            let _ = self.heights(level, samples, &mut band)?;
+            for (a, out) in (patches.x0..).zip(row) {
+                let patch = Patch::new(level, a, b).samples_within(size);
+                let columns = (patch.x0 - samples.x0) as usize..(patch.x1 - samples.x0) as usize;
+                let rows = band.chunks_exact(samples.width() as usize);
+                let [min, max] = range(rows.flat_map(|row| &row[columns.clone()]));
+                // How far it is off, nobody knows: detail is never left out.
+                *out = Bounds {
+                    min,
+                    max,
+                    error: if min.is_nan() { f32::NAN } else { f32::MAX },
+                    need_min,
+                    need_max,
+                    need_error: if need_min.is_nan() { f32::NAN } else { f32::MAX },
+                };
+            }
         }
         Ok(Arrival::Arrived)
     }
@@ -165,6 +180,16 @@ impl Levels for Draft {
     fn is_provisional(&self) -> bool {
         true
     }
+}
+
+/// The weighted mean of the corners that are not void: the DEM may have data where one is. NaN where those that count all
+/// are.
+fn without_voids(corners: [f32; 3], weights: [f32; 3]) -> f32 {
+    let there = corners.into_iter().zip(weights);
+    let (sum, weight) = there
+        .filter(|(h, w)| !h.is_nan() && *w > 0.0)
+        .fold((0.0, 0.0), |(sum, weight), (h, w)| (sum + h * w, weight + w));
+    if weight > 0.0 { sum / weight } else { f32::NAN }
 }
 
 /// Least and greatest; NaN where there is none.
@@ -394,8 +419,9 @@ mod tests {
             let _ = draft.bounds(level, Rect::new(5, 9, 6, 10), &mut bounds).unwrap();
             let samples = patch.samples_within(draft.grid.level(level));
             for (i, j) in samples.cells() {
-                let height = draft.at(level, i, j);
-                assert!(height.is_nan() || (bounds[0].min..=bounds[0].max).contains(&height));
+                let mut height = [0.0];
+                draft.row(level, i, j, &mut height);
+                assert!(height[0].is_nan() || (bounds[0].min..=bounds[0].max).contains(&height[0]));
             }
         }
         assert!(draft.is_provisional());
