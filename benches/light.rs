@@ -42,13 +42,14 @@ fn table(dem: &str, rounds: usize) -> Result<()> {
     let mut heights = vec![0.0; grid.size.samples() as usize];
     source.read(grid.size.rect(), &mut heights)?;
     let threads = Threads::new(0)?;
-    let suns = [(135.0, 3.0), (120.0, 3.0), (120.0, 0.5), (315.0, 45.0)].map(|(azimuth_deg, altitude_deg)| {
-        let sun = Sun {
-            azimuth_deg,
-            altitude_deg,
-        };
-        (format!("sun {azimuth_deg}, {altitude_deg}"), Some(sun))
-    });
+    let suns =
+        [(135.0, 3.0), (120.0, 3.0), (120.0, 0.5), (315.0, 45.0)].map(|(azimuth_deg, altitude_deg)| {
+            let sun = Sun {
+                azimuth_deg,
+                altitude_deg,
+            };
+            (format!("sun {azimuth_deg}, {altitude_deg}"), Some(sun))
+        });
     for (name, sun) in suns.into_iter().chain([("sky 4".to_string(), None)]) {
         let trace = |work: &dyn Work| {
             let start = Instant::now();

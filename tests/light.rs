@@ -33,7 +33,11 @@ impl Dem {
         let size = self.grid.size;
         // A crossing this near to a sample passes through it.
         let snap = |x: f64| {
-            if (x - x.round()).abs() < 1e-9 { x.round() } else { x }
+            if (x - x.round()).abs() < 1e-9 {
+                x.round()
+            } else {
+                x
+            }
         };
         let (u, v) = (snap(u), snap(v));
         let (i, j) = (u.floor() as i64, v.floor() as i64);
@@ -125,7 +129,10 @@ impl Dem {
     /// Of every sample the share of the sun's disc and the cosine between normal and sun, or NaN.
     fn cast(&self, sun: Sun, threads: &Threads) -> Vec<[f64; 2]> {
         let width = self.grid.size.width as usize;
-        let highest = self.heights.iter().fold(f64::NEG_INFINITY, |m, &h| m.max(h.into()));
+        let highest = self
+            .heights
+            .iter()
+            .fold(f64::NEG_INFINITY, |m, &h| m.max(h.into()));
         let mut cast = vec![[f64::NAN; 2]; self.heights.len()];
         each_chunk(threads, &mut cast, width, |j, row| {
             for (i, out) in (0..).zip(row) {

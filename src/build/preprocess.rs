@@ -9,7 +9,7 @@ use super::output::Output;
 use super::threads::Threads;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Rect, Size};
-use crate::light::{LightOptions, light_levels, sky_share, sun_share};
+use crate::light::{Earth, LightOptions, light_levels, sky_share_on, sun_share_on};
 use crate::progress::Progress;
 use crate::pyramid::{Filter, Pyramid};
 use crate::source::{Description, HeightSource};
@@ -24,6 +24,8 @@ const BAND_ROWS: i64 = 256;
 pub struct PreprocessOptions {
     /// The light to trace; none leaves it out of the file.
     pub light: Option<LightOptions>,
+    /// Whether light is traced over the earth's curve, with which coefficient of refraction; see [`Earth::of`].
+    pub curvature: Option<f64>,
     /// The filter that makes the levels above 0.
     pub filter: Filter,
     /// Whether to replace a target that exists.
@@ -40,6 +42,7 @@ impl Default for PreprocessOptions {
     fn default() -> Self {
         Self {
             light: Some(LightOptions::default()),
+            curvature: None,
             filter: Filter::default(),
             force: false,
             memory_bytes: DEFAULT_MEMORY_BYTES,
@@ -105,6 +108,8 @@ pub fn preprocess(
     if let Some(light) = &options.light {
         light.sun.check()?;
     }
+    let earth = Earth::of(&description.grid, description.place.as_ref(), options.curvature)
+        .map_err(|e| e.about(&description.name))?;
     memory::check(
         &description.name,
         &description.grid,
@@ -140,14 +145,14 @@ pub fn preprocess(
         report.bounds_s = clock.lap();
         if let Some(light) = &options.light {
             let (grid, heights) = (&description.grid, pyramid.level(0));
-            let sun = sun_share(heights, grid, light.sun, &threads, progress)?;
+            let sun = sun_share_on(heights, grid, &earth, light.sun, &threads, progress)?;
             report.sun_s = clock.lap();
-            let sky = sky_share(heights, grid, light.sky_directions, &threads, progress)?;
+            let sky = sky_share_on(heights, grid, &earth, light.sky_directions, &threads, progress)?;
             let levels = light_levels(grid, heights, sun, sky, &options.filter, &threads, progress)?;
             pyramid.set_light(levels)?;
             report.sky_s = clock.lap();
         }
-        let meta = describe(description, &pyramid, options, stamp);
+        let meta = describe(description, &pyramid, options, &earth, stamp);
         let buffered = BufWriter::with_capacity(1 << 20, &file);
         terrain::write(buffered, &meta, &pyramid, &threads, progress).map_err(|e| {
             if e.subject() == "terrain file" {
@@ -284,8 +289,13 @@ fn describe(
     description: &Description,
     pyramid: &Pyramid,
     options: &PreprocessOptions,
+    earth: &Earth,
     source: SourceStamp,
 ) -> Meta {
+    let mut assumed = description.assumed.clone();
+    if options.light.is_some() {
+        earth.assume(description.place.as_ref(), &description.grid, &mut assumed);
+    }
     Meta {
         grid: description.grid,
         place: description.place.clone(),
@@ -300,7 +310,7 @@ fn describe(
         }),
         source,
         tool: terrain::TOOL.into(),
-        assumed: description.assumed.clone(),
+        assumed,
     }
 }
 
