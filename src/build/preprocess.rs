@@ -293,9 +293,13 @@ fn describe(
     source: SourceStamp,
 ) -> Meta {
     let mut assumed = description.assumed.clone();
-    if options.light.is_some() {
-        earth.assume(description.place.as_ref(), &description.grid, &mut assumed);
-    }
+    let earth = options.light.map(|_| *earth);
+    Earth::assume(
+        earth.as_ref(),
+        description.place.as_ref(),
+        &description.grid,
+        &mut assumed,
+    );
     Meta {
         grid: description.grid,
         place: description.place.clone(),

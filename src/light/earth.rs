@@ -64,9 +64,18 @@ impl Earth {
         Ok(earth)
     }
 
-    /// Puts what holds of the light into `assumed`, in place of what was said of grid north or of earlier light.
-    pub fn assume(&self, place: Option<&Georeference>, grid: &Grid, assumed: &mut Vec<String>) {
+    /// Puts what holds of light over the earth of `light`, if there is light, into `assumed`, in place of what was said
+    /// of earlier light.
+    pub fn assume(
+        light: Option<&Self>,
+        place: Option<&Georeference>,
+        grid: &Grid,
+        assumed: &mut Vec<String>,
+    ) {
         assumed.retain(|sentence| !sentence.starts_with(SENTENCE));
+        let Some(earth) = light else {
+            return;
+        };
         if let Some(place) = place
             && !place.geographic
             && middle(grid, place).is_some()
@@ -74,13 +83,13 @@ impl Earth {
             assumed.push(format!(
                 "{SENTENCE}comes from azimuths that are turned from true north to grid north, which lies {:.3} degrees \
                  east of it at the DEM's middle.",
-                self.grid_north_deg
+                earth.grid_north_deg
             ));
         }
-        if self.radius_m.is_finite() {
+        if earth.radius_m.is_finite() {
             assumed.push(format!(
                 "{SENTENCE}runs straight over an earth of {:.1} km radius, refraction included.",
-                self.radius_m / 1e3
+                earth.radius_m / 1e3
             ));
         }
     }
@@ -182,7 +191,7 @@ mod tests {
         );
 
         let mut assumed = vec!["Heights are metres.".to_string(), format!("{SENTENCE}is old.")];
-        earth.assume(Some(&at), &grid, &mut assumed);
+        Earth::assume(Some(&earth), Some(&at), &grid, &mut assumed);
         assert_eq!(assumed.len(), 2);
         assert!(
             assumed[1].contains("3.") && assumed[1].contains("turned"),
@@ -191,7 +200,7 @@ mod tests {
         let degrees = place(Some("EPSG:4326"), true, [10.0, 45.0]);
         let geographic = Earth::of(&grid, Some(&degrees), None).unwrap();
         assert_eq!(geographic, Earth::default());
-        geographic.assume(Some(&degrees), &grid, &mut assumed);
+        Earth::assume(Some(&geographic), Some(&degrees), &grid, &mut assumed);
         assert_eq!(assumed, ["Heights are metres."]);
     }
 

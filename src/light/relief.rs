@@ -233,14 +233,14 @@ mod tests {
             let (count, down) = (1 + random.below(20) as usize, random.unit() < 0.5);
             let values = random.heights((width * height) as i64, -1.0, 1.0, 0.0);
             let got = slide(&values, width, down, count);
-            for at in 0..width * height {
+            for (at, &got) in got.iter().enumerate() {
                 let (x, z) = (at % width, at / width);
                 let held = (0..count).filter_map(|k| {
                     let (x, z) = if down { (x, z + k) } else { (x + k, z) };
                     (x < width && z < height).then(|| values[z * width + x])
                 });
                 assert_eq!(
-                    got[at],
+                    got,
                     held.fold(f32::NEG_INFINITY, f32::max),
                     "{width} x {height}, {count}"
                 );
