@@ -9,7 +9,8 @@
 //! 1. *Displaced or static*: the same triangles from a vertex buffer that the twin filled beforehand (place, height,
 //!    alpha, level: what the vertex function computes from textures and the held field), shaded by the same fragment
 //!    function, with the same indices.
-//! 2. *Culling* on and off.
+//! 2. *Culling* on and off; and the same triangles from static vertex buffers, whose ratio is that of a vertex function
+//!    without work: the cheaper vertices are, the less culling them saves.
 //! 3. *CPU*: an update that only turns (selection alone), and the flight's own, which move windows.
 #![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
@@ -306,8 +307,9 @@ fn culling(gpu: &Gpu, terrain: &Terrain, frames: &[Camera], rounds: usize) -> Re
     for (size_px, aim) in SIZES_PX.into_iter().zip([1.25, 1.8]) {
         let mut culled = Headless::new(gpu.clone(), terrain, &options(size_px, true))?;
         let mut all = Headless::new(gpu.clone(), terrain, &options(size_px, false))?;
+        let pipelines = StaticPipelines::new(gpu, &culled)?;
         let targets = Targets::new(gpu, size_px);
-        let mut pair = Pair::default();
+        let (mut pair, mut fixed) = (Pair::default(), Pair::default());
         let mut triangles = [0, 0];
         for camera in frames {
             let pictures = [
@@ -324,6 +326,13 @@ fn culling(gpu: &Gpu, terrain: &Terrain, frames: &[Camera], rounds: usize) -> Re
             for round in 0..rounds {
                 pair.time(round, |which| targets.clipmap_ms([&culled, &all][which]))?;
             }
+            let meshes = [&culled, &all].map(|headless| StaticMesh::new(gpu, headless.clipmap()));
+            for round in 0..rounds {
+                fixed.time(round, |which| {
+                    let headless = [&culled, &all][which];
+                    targets.draw_ms(|pass| pipelines.draw(pass, &meshes[which], headless))
+                })?;
+            }
         }
         let [on, off, ratio] = pair.medians();
         let share = triangles[0] as f64 / triangles[1] as f64;
@@ -336,6 +345,8 @@ fn culling(gpu: &Gpu, terrain: &Terrain, frames: &[Camera], rounds: usize) -> Re
             triangles[1] / frames.len() as u64,
             met(share <= 0.30)
         );
+        let [on, off, ratio] = fixed.medians();
+        println!("   static  {on:7.2}  {off:7.2}  {:5.2}", 1.0 / ratio);
     }
     Ok(())
 }

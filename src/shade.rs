@@ -63,18 +63,31 @@ pub struct ShadeConstants {
     pub base_m: f32,
     /// Factor on slopes where light follows from them: the vertical scale.
     pub slope_scale: f32,
+    /// 1 over the metres over which the ground's tint stretches.
+    pub per_relief: f32,
+    /// Height of the eye as drawn above the lowest ground, in [`HAZE_SCALE_M`].
+    pub eye_haze: f32,
+    /// Density of the air at the eye, 1 at the lowest ground and below it.
+    pub eye_density: f32,
+    /// Fills the struct to a multiple of 16 bytes.
+    pub unused: f32,
 }
 
 impl ShadeConstants {
-    /// The constants for a DEM with heights in `range_m` above `base_m`.
-    pub fn new(sun: &Sun, range_m: [f32; 2], base_m: f64, vertical_scale: f64) -> Self {
+    /// The constants for a DEM with heights in `range_m` above `base_m`, seen from `eye_height_m` above `base_m`.
+    pub fn new(sun: &Sun, range_m: [f32; 2], base_m: f64, vertical_scale: f64, eye_height_m: f32) -> Self {
         let [x, y, z] = sun.direction();
+        let eye_haze = (eye_height_m - range_m[0]) * vertical_scale as f32 * (1.0 / HAZE_SCALE_M);
         Self {
             to_sun: [x as f32, y as f32, z as f32, 0.0],
             low_m: range_m[0],
             high_m: range_m[1],
             base_m: base_m as f32,
             slope_scale: vertical_scale as f32,
+            per_relief: 1.0 / (range_m[1] - range_m[0]).max(RELIEF_LEAST_M),
+            eye_haze,
+            eye_density: (-eye_haze.clamp(0.0, 80.0)).exp(),
+            unused: 0.0,
         }
     }
 }
@@ -107,8 +120,8 @@ pub const SNOW_M: [f32; 2] = [2350.0, 2900.0];
 pub const RELIEF_LEAST_M: f32 = 300.0;
 /// Height in metres by which the air's density falls to 1/e.
 pub const HAZE_SCALE_M: f32 = 8000.0;
-/// Extinction by wavelength at the lowest ground, per metre: blue scatters most.
-pub const HAZE_PER_M: Vec3 = Vec3::new(0.36e-5, 0.58e-5, 1.0e-5);
+/// Extinction at the lowest ground, per metre, of which red has 2, green 3 and blue 5: blue scatters most.
+pub const HAZE_PER_M: f32 = 0.193e-5;
 /// The sky at the horizon, which is also the colour of much air.
 pub const SKY_HORIZON: Vec3 = Vec3::new(0.75, 0.95, 1.20);
 /// The sky overhead.
@@ -147,8 +160,8 @@ pub fn wgsl_constants() -> String {
         ("MEADOW_UP", MEADOW_UP),
         ("SNOW_LOW_M", SNOW_M[0]),
         ("SNOW_HIGH_M", SNOW_M[1]),
-        ("RELIEF_LEAST_M", RELIEF_LEAST_M),
         ("HAZE_SCALE_M", HAZE_SCALE_M),
+        ("HAZE_PER_M", HAZE_PER_M),
         ("EXPOSURE", EXPOSURE),
         ("WIRE_PX", WIRE_PX),
         ("VALID_LEAST", VALID_LEAST),
@@ -164,7 +177,6 @@ pub fn wgsl_constants() -> String {
         ("GROUND_ROCK", GROUND_ROCK),
         ("GROUND_SNOW", GROUND_SNOW),
         ("GROUND_PLAIN", GROUND_PLAIN),
-        ("HAZE_PER_M", HAZE_PER_M),
         ("SKY_HORIZON", SKY_HORIZON),
         ("SKY_ZENITH", SKY_ZENITH),
         ("SKY_BELOW", SKY_BELOW),

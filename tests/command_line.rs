@@ -417,10 +417,6 @@ fn render_refuses_at_once_what_it_could_only_spoil() {
         ("render a.asc -o b.png --stats b.png", "b.png: is asked for twice"),
         ("render a.asc -o b.png --size 9000x10", "a size of 9000x10 pixels"),
         (
-            "render a.asc -o b.png --clip-size 64 --transition 99",
-            "transition: 99 steps",
-        ),
-        (
             "render a.asc -o f --flight orbit --frames 5..900",
             "frames: frames 5..900",
         ),
@@ -433,6 +429,24 @@ fn render_refuses_at_once_what_it_could_only_spoil() {
             "{arguments}: {}",
             ran.err
         );
+    }
+    let huge = grid.replace('6', "-1e38");
+    fs::write(folder.path().join("huge.asc"), huge).unwrap();
+    if clipscape::gpu::open().is_ok() {
+        let says = ["huge.asc: has heights of -1.0e38 m", "--nodata"];
+        fails(folder.path(), 1, &["render", "huge.asc", "-o", "b.png"], &says);
+    }
+    fs::remove_file(folder.path().join("huge.asc")).unwrap();
+    for (arguments, says) in [
+        ("--clip-size 64 --transition 99", "transition: 99 steps"),
+        ("--upload-budget 1M", "set wait to none"),
+        ("--clip-size auto", "give --max-error-px too"),
+    ] {
+        let words: Vec<&str> = "render a.asc -o b.png"
+            .split(' ')
+            .chain(arguments.split(' '))
+            .collect();
+        fails(folder.path(), 2, &words, &[says]);
     }
     assert_eq!(fs::read_to_string(folder.path().join("a.asc")).unwrap(), grid);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left");

@@ -176,7 +176,11 @@ fn mirrored_structs_have_the_layout_that_shaders_read() {
         low_m,
         high_m,
         base_m,
-        slope_scale
+        slope_scale,
+        per_relief,
+        eye_haze,
+        eye_density,
+        unused
     });
     assert_eq!(ours, layout(&terrain, "ShadeConstants"));
 }

@@ -20,7 +20,7 @@ struct SurfacePoint {
 // The ground's own colour at a point: by its height within the DEM's, its height above the sea, and its true slope.
 fn tint(point: SurfacePoint) -> vec3<f32> {
     let true_up = inverseSqrt(1.0 + dot(point.slopes, point.slopes));
-    let rise = (point.above_base_m - shade.low_m) / max(shade.high_m - shade.low_m, RELIEF_LEAST_M);
+    let rise = (point.above_base_m - shade.low_m) * shade.per_relief;
     return ground_colour(clamp(rise, 0.0, 1.0), point.height_m, true_up);
 }
 
@@ -28,8 +28,7 @@ fn tint(point: SurfacePoint) -> vec3<f32> {
 fn through_air(radiance: vec3<f32>, from_eye_m: vec3<f32>) -> vec3<f32> {
     // Farther than f32 can square a length is infinite, and times no density at all no number.
     let distance_m = min(length(from_eye_m), 1e18);
-    let eye_m = (view.eye_height_m.x - shade.low_m) * view.vertical_scale;
-    let clear = transmission(distance_m, eye_m, eye_m + from_eye_m.y);
+    let clear = transmission(distance_m, from_eye_m.y);
     let level_ray = vec3(from_eye_m.x, 0.0, from_eye_m.z) * inverseSqrt(max(dot(from_eye_m.xz, from_eye_m.xz), 1e-30));
     return radiance * clear + horizon_colour(level_ray) * (1.0 - clear);
 }

@@ -6,6 +6,10 @@ struct ShadeConstants {
     high_m: f32,
     base_m: f32,                // height of the DEM's base above sea level
     slope_scale: f32,           // factor on slopes where light follows from them
+    per_relief: f32,            // 1 over the metres over which the tint stretches
+    eye_haze: f32,              // height of the eye above the lowest ground over HAZE_SCALE_M
+    eye_density: f32,           // of the air at the eye: 1 at the lowest ground
+    unused: f32,
 }
 
 @group(0) @binding(4) var<uniform> shade: ShadeConstants;
@@ -31,17 +35,22 @@ fn illumination(sun: f32, sky: f32) -> vec3<f32> {
     return SUN_LIGHT * sun + SKY_LIGHT * sky;
 }
 
-// Share of the light that reaches the eye through the air, by wavelength: density falls with height by HAZE_SCALE_M.
-// `from_m` and `to_m` are the heights of the ends above the lowest ground.
-fn transmission(distance_m: f32, from_m: f32, to_m: f32) -> vec3<f32> {
+// Share of the light that reaches the eye through the air, by wavelength: density is exp(-h) at h times HAZE_SCALE_M above
+// the lowest ground. `up_m` is the far end's height above the eye.
+fn transmission(distance_m: f32, up_m: f32) -> vec3<f32> {
     // Some adapters' exp is no number far below 0, where it should vanish; at -80 it has.
-    let a = clamp(from_m * (1.0 / HAZE_SCALE_M), 0.0, 80.0);
-    let b = clamp(to_m * (1.0 / HAZE_SCALE_M), 0.0, 80.0);
-    // The mean of exp(-h) from a to b, which is exp(-a) (1 - exp(-x)) / x with x = b - a; near x = 0 by its series.
+    let a = clamp(shade.eye_haze, 0.0, 80.0);
+    let b = clamp(shade.eye_haze + up_m * (1.0 / HAZE_SCALE_M), 0.0, 80.0);
+    // The mean of exp(-h) from a to b, which is (exp(-a) - exp(-b)) / (b - a); where they are near by its series.
     let x = b - a;
     let is_level = abs(x) < 1e-3;
-    let density = exp(-a) * select((1.0 - exp(-x)) / select(x, 1.0, is_level), 1.0 - 0.5 * x, is_level);
-    return exp(-min(HAZE_PER_M * (density * distance_m), vec3(80.0)));
+    let mean = (shade.eye_density - exp(-b)) / select(x, 1.0, is_level);
+    let density = select(mean, shade.eye_density * (1.0 - 0.5 * x), is_level);
+    // Red, green and blue are powers of one number, as their extinctions are multiples of one: an exponential for three.
+    let clear = exp(-min(HAZE_PER_M * (density * distance_m), 16.0));
+    let squared = clear * clear;
+    let cubed = squared * clear;
+    return vec3(squared, cubed, squared * cubed);
 }
 
 // The sky's glow around the sun, in a direction (unit vector).

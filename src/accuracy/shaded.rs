@@ -81,8 +81,11 @@ impl Shading {
     pub fn picture(&self, truth: &Truth<'_>, view: &View, work: &dyn Work) -> Result<Vec<u8>> {
         let grid = truth.grid();
         let scale = truth.vertical_scale();
+        let shade = |eye_height_m| {
+            ShadeConstants::new(&self.look.sun, self.range_m, grid.base_m, scale, eye_height_m)
+        };
         let fragment = |probe: &Probe<'_>| Fragment {
-            shade: ShadeConstants::new(&self.look.sun, self.range_m, grid.base_m, scale),
+            shade: shade(probe.eye().height_high_low()[0]),
             eye_height_m: probe.eye().height_high_low(),
             vertical_scale: scale as f32,
             spacing_m: grid.spacing_m.map(|s| s as f32),

@@ -72,6 +72,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 enum Failure {
     /// Something is wrong: it is said in one line.
     Error(Error),
+    /// Flags that do not go together: it is said in one line.
+    #[cfg(feature = "gpu")]
+    Usage(Error),
     /// All has been said already.
     Said,
     /// Whoever read standard output has stopped reading, which is their right.
@@ -91,6 +94,11 @@ fn status(outcome: Outcome) -> u8 {
     match outcome {
         Ok(()) | Err(Failure::BrokenPipe) => DONE_STATUS,
         Err(Failure::Said) => FAILED_STATUS,
+        #[cfg(feature = "gpu")]
+        Err(Failure::Usage(error)) => {
+            say(&error.to_string());
+            USAGE_STATUS
+        }
         Err(Failure::Error(error)) => {
             say(&error.to_string());
             if error.kind() == ErrorKind::Cancelled {

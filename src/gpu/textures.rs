@@ -118,6 +118,7 @@ impl ViewTextures {
             clipmap.height_range_m(),
             clipmap.grid().base_m,
             clipmap.vertical_scale(),
+            clipmap.view_constants().eye_height_m[0],
         );
         let mut upload = self.staging.begin(encoder);
         let recorded = if before == Some(now) {

@@ -106,18 +106,36 @@ impl Fragment {
     /// `tint` in WGSL.
     fn ground_tint(&self, point: &SurfacePoint) -> Vec3 {
         let true_up = 1.0 / (1.0 + point.slopes.dot(point.slopes)).sqrt();
-        let relief_m = (self.shade.high_m - self.shade.low_m).max(RELIEF_LEAST_M);
-        let rise = (point.above_base_m - self.shade.low_m) / relief_m;
+        let rise = (point.above_base_m - self.shade.low_m) * self.shade.per_relief;
         ground_colour(rise.clamp(0.0, 1.0), point.height_m, true_up)
     }
 
     fn through_air(&self, radiance: Vec3, from_eye_m: Vec3) -> Vec3 {
         let distance_m = from_eye_m.length().min(1e18);
-        let eye_m = (self.eye_height_m[0] - self.shade.low_m) * self.vertical_scale;
-        let clear = transmission(distance_m, eye_m, eye_m + from_eye_m.y);
+        let clear = self.transmission(distance_m, from_eye_m.y);
         let level = Vec3::new(from_eye_m.x, 0.0, from_eye_m.z);
         let level_ray = level / level.dot(level).max(1e-30).sqrt();
         radiance * clear + self.horizon_colour(level_ray) * (1.0 - clear)
+    }
+
+    fn transmission(&self, distance_m: f32, up_m: f32) -> Vec3 {
+        let ShadeConstants {
+            eye_haze,
+            eye_density,
+            ..
+        } = self.shade;
+        let a = eye_haze.clamp(0.0, 80.0);
+        let b = (eye_haze + up_m * (1.0 / HAZE_SCALE_M)).clamp(0.0, 80.0);
+        let x = b - a;
+        let density = if x.abs() < 1e-3 {
+            eye_density * (1.0 - 0.5 * x)
+        } else {
+            (eye_density - (-b).exp()) / x
+        };
+        let clear = (-(HAZE_PER_M * (density * distance_m)).min(16.0)).exp();
+        let squared = clear * clear;
+        let cubed = squared * clear;
+        Vec3::new(squared, cubed, squared * cubed)
     }
 
     fn sun_glow(&self, direction: Vec3) -> Vec3 {
@@ -163,22 +181,6 @@ fn ground_colour(rise: f32, height_m: f32, up: f32) -> Vec3 {
 
 fn illumination(sun: f32, sky: f32) -> Vec3 {
     SUN_LIGHT * sun + SKY_LIGHT * sky
-}
-
-fn transmission(distance_m: f32, from_m: f32, to_m: f32) -> Vec3 {
-    let a = (from_m * (1.0 / HAZE_SCALE_M)).clamp(0.0, 80.0);
-    let b = (to_m * (1.0 / HAZE_SCALE_M)).clamp(0.0, 80.0);
-    let x = b - a;
-    let is_level = x.abs() < 1e-3;
-    let mean = if is_level {
-        1.0 - 0.5 * x
-    } else {
-        (1.0 - (-x).exp()) / x
-    };
-    let density = (-a).exp() * mean;
-    (HAZE_PER_M * (density * distance_m))
-        .min(Vec3::splat(80.0))
-        .map(|v| (-v).exp())
 }
 
 /// From radiance to what a display shows, before its own encoding.

@@ -1,6 +1,6 @@
 //! A part of a DEM, and a spacing given by the user in place of the file's.
 
-use super::{Crop, Description, Georeference, HeightSource, OpenOptions, geographic};
+use super::{Crop, Description, Georeference, HeightSource, OpenOptions, Overview, Reads, geographic};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
 use crate::progress::Progress;
@@ -147,6 +147,20 @@ impl HeightSource for Part {
         self.whole.read(rect.moved(self.at[0], self.at[1]), out)
     }
 
+    /// Those of the whole, of which the part may have read little.
+    fn reads(&self) -> Reads {
+        self.whole.reads()
+    }
+
+    /// Those of the whole, which reach beyond the part.
+    fn overviews(&self) -> Result<Vec<Overview>> {
+        let mut overviews = self.whole.overviews()?;
+        for Overview { shift, .. } in &mut overviews {
+            *shift = [shift[0] - self.at[0] as f64, shift[1] - self.at[1] as f64];
+        }
+        Ok(overviews)
+    }
+
     /// Those of the whole: a part may be free of what they tell.
     fn remarks(&self, progress: &dyn Progress) -> Result<Vec<String>> {
         self.whole.remarks(progress)
@@ -221,6 +235,42 @@ mod tests {
             part.read(Rect::new(0, 0, 4, 1), &mut [0.0; 4]).is_err(),
             "beyond the part, though in the whole"
         );
+    }
+
+    /// A DEM that counts what is read of it and has one overview, of every fourth sample.
+    struct Reduced(Box<dyn HeightSource>);
+
+    impl HeightSource for Reduced {
+        fn description(&self) -> &Description {
+            self.0.description()
+        }
+
+        fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {
+            self.0.read(rect, out)
+        }
+
+        fn reads(&self) -> Reads {
+            Reads {
+                decoded: 7,
+                ..Reads::default()
+            }
+        }
+
+        fn overviews(&self) -> Result<Vec<Overview>> {
+            Ok(vec![Overview {
+                source: dem(None),
+                step: [4.0, 4.0],
+                shift: [1.5, 1.5],
+            }])
+        }
+    }
+
+    #[test]
+    fn overviews_lie_where_they_lay_over_the_whole() {
+        let part = crop(Box::new(Reduced(dem(None))), Crop::Samples(Rect::new(1, 2, 4, 4))).unwrap();
+        let overviews = part.overviews().unwrap();
+        assert_eq!((overviews[0].step, overviews[0].shift), ([4.0, 4.0], [0.5, -0.5]));
+        assert_eq!(part.reads().decoded, 7);
     }
 
     #[test]

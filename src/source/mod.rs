@@ -134,7 +134,8 @@ pub struct Reads {
 
 /// A coarser copy of a DEM, and where its samples lie.
 ///
-/// Its sample in column i lies over column `i * step[0] + shift[0]` of the DEM, likewise for rows.
+/// Its sample in column i lies over column `i * step[0] + shift[0]` of the DEM, likewise for rows; over a part of a larger
+/// DEM it may reach beyond the part.
 pub struct Overview {
     /// Its heights, above the DEM's own base.
     pub source: Box<dyn HeightSource>,

@@ -4,8 +4,8 @@
 //! A short form runs with the other tests. The full one, here ten minutes for each format, in any number of processes:
 //!
 //! ```sh
-//! CLIPSCAPE_FUZZ_S=600 cargo test --release --test fuzz -- --nocapture             # all formats side by side
-//! CLIPSCAPE_FUZZ_S=600 CLIPSCAPE_FUZZ_SEED=7 cargo test --release --test fuzz png  # one format, other damage
+//! CLIPSCAPE_FUZZ_S=600 cargo test --release --test fuzz -- --test-threads 13   # all formats side by side
+//! CLIPSCAPE_FUZZ_S=600 CLIPSCAPE_FUZZ_SEED=7 cargo test --release --test fuzz png   # one format, other damage
 //! ```
 //!
 //! A finding is written to `target/tmp/fuzz-FORMAT` (also one that ends the process, as an allocation beyond all memory
