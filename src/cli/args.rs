@@ -1,5 +1,6 @@
 //! What may be typed: commands, their options, and the help of each.
 
+mod cache;
 mod input;
 #[cfg(feature = "gpu")]
 mod measure;
@@ -10,6 +11,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+pub(super) use self::cache::{CacheAction, CacheArgs};
 pub(super) use self::input::InputArgs;
 #[cfg(feature = "gpu")]
 pub(super) use self::measure::MeasureArgs;
@@ -43,6 +45,7 @@ pub(super) enum Command {
     Render(Box<RenderArgs>),
     #[cfg(feature = "gpu")]
     Measure(Box<MeasureArgs>),
+    Cache(CacheArgs),
     #[cfg(feature = "dem")]
     Export(ExportArgs),
     #[cfg(feature = "dem")]
