@@ -98,6 +98,12 @@ pub trait HeightSource: Send + Sync {
     /// Where the file is damaged, vanished, or uses what this crate does not read.
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()>;
 
+    /// The most memory that it holds while it is read from north to south, in bytes; what it takes on the way back is not
+    /// counted.
+    fn held_bytes(&self) -> u64 {
+        0
+    }
+
     /// What all reads so far have met; zeros where a source does not count.
     fn reads(&self) -> Reads {
         Reads::default()
