@@ -202,6 +202,7 @@ fn frame_stats(frame: &Frame, headless: &Headless, k: u64, t_s: f64, camera: &Ca
         error_m_max: errors.map(|e| e.error_m_max),
         error_floor_px: errors.map(|e| e.error_floor_px),
         cracks: frame.measured.as_ref().map(|m| m.cracks),
+        beside_px: errors.map(|e| e.beside_px),
         silhouette_px: errors.map(|e| e.silhouette_px),
         certified_error_px: frame.certificate.error_px.ok(),
         certificate_reason: frame.certificate.error_px.err().map(|u| u.reason().to_string()),

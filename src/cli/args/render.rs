@@ -85,7 +85,8 @@ pub(in crate::cli) struct RenderArgs {
 
     /// Measure every drawn frame against the DEM's own surface, and say in --stats how far off it is on the screen and in
     /// metres (error_*), how many pixels see through the drawn surface (cracks), and at how many the two disagree about
-    /// being terrain (silhouette_px); takes a while, and needs --stats
+    /// being terrain (silhouette_px); a pixel whose depth is that of a triangle beside it is measured on that triangle
+    /// (beside_px). Takes a while, and needs --stats
     #[arg(long, requires = "stats")]
     pub(in crate::cli) measure: bool,
 
