@@ -65,6 +65,28 @@ pub enum Arrival {
     Missing,
 }
 
+/// What levels hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Data {
+    /// [`Levels::heights`].
+    Heights,
+    /// [`Levels::bounds`]: rectangles are of patches.
+    Bounds,
+    /// [`Levels::light`].
+    Light,
+}
+
+/// What will be asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Wanted {
+    /// What of it.
+    pub data: Data,
+    /// Of which level.
+    pub level: u32,
+    /// Samples, or patches for bounds.
+    pub rect: Rect,
+}
+
 /// The levels of a DEM: sizes, heights, bounds and light, by rectangles.
 ///
 /// Rectangles must lie within the level. Outputs are row by row, `rect.area()` long. Heights are metres less
@@ -99,8 +121,14 @@ pub trait Levels: Send + Sync {
     /// Where the data are damaged or cannot be read, or there is no light.
     fn light(&self, level: u32, rect: Rect, out: &mut [LightSample]) -> Result<Arrival>;
 
-    /// Hears which rectangles will soon be asked for, most urgent first. A source that reads at once ignores it.
-    fn want(&self, wanted: &[(u32, Rect)]) {
+    /// Hears what will soon be asked for, most urgent first, in place of what it was told before: what is not among it is
+    /// no longer wanted. A source that reads at once ignores it.
+    fn want(&self, wanted: &[Wanted]) {
+        let _ = wanted;
+    }
+
+    /// Waits until all of this has arrived, or has been found damaged. A source that reads at once ignores it.
+    fn wait_for(&self, wanted: &[Wanted]) {
         let _ = wanted;
     }
 

@@ -8,7 +8,9 @@ mod support;
 
 use clipscape::Result;
 use clipscape::camera::{Camera, View};
-use clipscape::clipmap::{CORNERS, Clipmap, ClipmapOptions, Corners, Drawn, Terms, certified_patches};
+use clipscape::clipmap::{
+    CORNERS, Clipmap, ClipmapOptions, Corners, Drawn, Terms, certified_patches, certify_by,
+};
 use clipscape::grid::{Grid, PATCH, Patch, Rect, Size};
 use clipscape::levels::{Arrival, Bounds, Levels, LightSample};
 use clipscape::progress::Silent;
@@ -80,8 +82,12 @@ fn strays(levels: &dyn Levels, clipmap: &Clipmap, terms: Terms) -> (f64, usize, 
     );
     let drawn = Drawn::new(clipmap).unwrap();
     let (mut share, mut patches, mut further) = (0.0f64, 0, Vec::new());
+    let mut greatest_px = 0.0f64;
     for certified in certified_patches(clipmap, terms).unwrap() {
         let patch = certified.patch;
+        let px = certified.error_px.unwrap_or(f64::INFINITY);
+        assert!(px <= certified.at_most_px * (1.0 + 1e-12), "{certified:?}");
+        greatest_px = greatest_px.max(px);
         let corners = drawn.corners(patch).unwrap();
         let worst = strayed_m(corners, patch, &truth, size);
         let error_m = certified.error_m.unwrap();
@@ -93,6 +99,12 @@ fn strays(levels: &dyn Levels, clipmap: &Clipmap, terms: Terms) -> (f64, usize, 
             share = share.max(worst / error_m);
         }
     }
+    // What is left out as allowing less than was found decides nothing.
+    let whole = certify_by(clipmap, terms)
+        .unwrap()
+        .error_px
+        .unwrap_or(f64::INFINITY);
+    assert_eq!(whole, greatest_px);
     (share, patches, further)
 }
 

@@ -430,6 +430,13 @@ fn render_refuses_at_once_what_it_could_only_spoil() {
             ran.err
         );
     }
+    let huge = grid.replace('6', "-1e38");
+    fs::write(folder.path().join("huge.asc"), huge).unwrap();
+    if clipscape::gpu::open().is_ok() {
+        let says = ["huge.asc: has heights of -1.0e38 m", "--nodata"];
+        fails(folder.path(), 1, &["render", "huge.asc", "-o", "b.png"], &says);
+    }
+    fs::remove_file(folder.path().join("huge.asc")).unwrap();
     for (arguments, says) in [
         ("--clip-size 64 --transition 99", "transition: 99 steps"),
         ("--upload-budget 1M", "set wait to none"),

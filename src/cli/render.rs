@@ -3,6 +3,7 @@
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::args::{RenderArgs, ViewArgs};
 use super::input::{beside, first};
@@ -11,8 +12,8 @@ use super::shots::{Planned, Shots, camera};
 use super::view_values::ClipSize;
 use super::{Failure, Outcome};
 use crate::build::{Output, refuse_existing};
-use crate::camera::{Flight, check_picture, overview};
-use crate::clipmap::{ClipmapOptions, fit_clip_size, height_range_m};
+use crate::camera::{Flight, MAX_EYE_M, check_picture, overview};
+use crate::clipmap::{ClipmapOptions, Wait, fit_clip_size, height_range_m};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu;
 use crate::grid::Grid;
@@ -21,10 +22,13 @@ use crate::progress::Progress;
 use crate::render::{Headless, HeadlessOptions, Recording, picture};
 use crate::source;
 use crate::stats::{FrameStats, PooledErrors, Run, SummaryStats};
-use crate::stream::Terrain;
+use crate::stream::{Terrain, TileOptions};
 
 /// Clip size where none is given and the camera is among the terrain.
 const CLIP_SIZE: i64 = 256;
+
+/// Faults of data that are said one by one.
+const SHOWN_FAULTS: usize = 4;
 
 /// Runs the command.
 pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
@@ -57,6 +61,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         (None, false) => {}
     }
     let mut clipmap = clipmap_options(args).map_err(Failure::Usage)?;
+    let tiles = tile_options(&args.view)?;
     let stats = args
         .view
         .stats
@@ -65,14 +70,19 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         .transpose()?;
     let gpu = gpu::open()?;
 
-    let terrain = Terrain::open_with(&args.input.inputs, &args.input.read.options(), terminal)?;
+    let terrain =
+        Terrain::open_with(&args.input.inputs, &args.input.read.options(), terminal)?.with_tiles(&tiles)?;
+    let terrain = Arc::new(terrain);
     warn_of_sun(args, &terrain, terminal);
     let flight = flight.map(|flight| flight.over(&terrain)).transpose()?;
     let camera = camera(args, &terrain)?;
     let scale = args.view.vertical_scale;
-    let heights = height_range_m(&terrain)?.map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
+    let heights = height_range_m(terrain.as_ref())?.map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
     let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
     let aspect = f64::from(args.view.size[0]) / f64::from(args.view.size[1]);
+    if camera.is_none() && flight.is_none() {
+        check_heights(&terrain, low, high)?;
+    }
     let shots = match (flight, args.flight.is_some(), camera) {
         (Some(flight), ..) => Shots::Flight(flight),
         (None, true, _) => Shots::Flight(Flight::orbit(terrain.grid(), low, high).scaled_down(scale)?),
@@ -82,18 +92,24 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     if args.view.clip_size == Some(ClipSize::Auto) {
         clipmap.clip_size = fitting_clip_size(args, &shots, &terrain, &clipmap, terminal)?;
     }
-    let mut headless = Headless::new(gpu, &terrain, &headless_options(&args.view, &terrain, &clipmap))?;
+    let arriving = terrain.arriving();
+    let levels: &dyn Levels = match clipmap.wait {
+        Wait::All => terrain.as_ref(),
+        Wait::None => &arriving,
+    };
+    let mut headless = Headless::new(gpu, levels, &headless_options(&args.view, &terrain, &clipmap))?;
+    headless.set_truth(terrain.clone());
     if args.measure {
         headless.measure()?;
     }
     let frames = match &shots {
-        Shots::Flight(flight) => recording.record(&mut headless, &terrain, flight, terminal)?,
+        Shots::Flight(flight) => recording.record(&mut headless, levels, flight, terminal)?,
         Shots::Still(camera) => {
             vec![picture(
                 &out,
                 args.force,
                 &mut headless,
-                &terrain,
+                levels,
                 camera,
                 terminal,
             )?]
@@ -119,9 +135,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         write_stats(&file, path, &frames, run)?;
         output.publish(&file)?;
     }
-    for fault in &faults {
-        terminal.warn(fault);
-    }
+    warn_of_faults(&faults, terminal);
     if frames.iter().any(|f| !f.complete) {
         terminal.warn("some frames were drawn before all of their data were there; see --wait");
     }
@@ -168,6 +182,19 @@ fn warn_of_promise(frames: &[FrameStats], terminal: &Terminal) {
         frames.len(),
         first.frame
     ));
+}
+
+/// Says what is wrong with the data, and where it is much, how much.
+fn warn_of_faults(faults: &[String], terminal: &Terminal) {
+    for fault in faults.iter().take(SHOWN_FAULTS) {
+        terminal.warn(fault);
+    }
+    if faults.len() > SHOWN_FAULTS {
+        let more = faults.len() - SHOWN_FAULTS;
+        terminal.warn(&format!(
+            "{more} more faults like these; see clipscape info --verify"
+        ));
+    }
 }
 
 /// What faults say, each once: ground that is met again is damaged still.
@@ -278,6 +305,18 @@ fn clipmap_options(args: &RenderArgs) -> Result<ClipmapOptions> {
     Ok(options)
 }
 
+fn tile_options(view: &ViewArgs) -> Result<TileOptions> {
+    let defaults = TileOptions::default();
+    let options = TileOptions {
+        memory_bytes: view.memory.map_or(defaults.memory_bytes, |b| {
+            usize::try_from(b).unwrap_or(usize::MAX)
+        }),
+        ..defaults
+    };
+    options.check().map_err(|e| e.about("--memory"))?;
+    Ok(options)
+}
+
 fn headless_options(view: &ViewArgs, terrain: &Terrain, clipmap: &ClipmapOptions) -> HeadlessOptions {
     // Traced light is that of its own sun; it moves only by preprocessing.
     let sun = terrain.sun().or(view.sun).unwrap_or_default();
@@ -291,6 +330,18 @@ fn headless_options(view: &ViewArgs, terrain: &Terrain, clipmap: &ClipmapOptions
         sun,
         clipmap: *clipmap,
     }
+}
+
+/// Refuses to look for a place from which heights beyond any camera's would be seen: most often they stand for no data.
+fn check_heights(terrain: &Terrain, low: f64, high: f64) -> Result<()> {
+    let most = if -low > high { low } else { high };
+    if most.abs() <= MAX_EYE_M / 8.0 {
+        return Ok(());
+    }
+    let what = format!("has heights of {most:.1e} m as drawn, too far up or down for a view of the whole");
+    Err(Error::new(ErrorKind::Limit, terrain.name(), what).advice(
+        "if they stand for no data, name their value with --nodata; else place the camera with --eye",
+    ))
 }
 
 fn warn_of_sun(args: &RenderArgs, terrain: &Terrain, terminal: &Terminal) {

@@ -1,12 +1,14 @@
 //! Arrivals: reading what windows miss, coarse levels first, within a frame's budget.
 
+use std::collections::HashSet;
+
 use super::eye::Eye;
 use super::missing::distance;
 use super::plan::{HEIGHT_BYTES, LIGHT_BYTES, UpdatePlan};
 use super::window::{Scratch, Window, is_damage};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
-use crate::levels::{Arrival, Levels};
+use crate::levels::{Arrival, Levels, Wanted};
 
 /// Samples along a side of the tiles that data come in: nothing that is asked for at once crosses their borders, so
 /// that a tile which is late, or damaged, holds up no other.
@@ -22,12 +24,41 @@ pub enum Wait {
     None,
 }
 
+/// Faults that are told apart, at most: a file that is damaged all over must not fill the memory.
+const MOST_FAULTS: usize = 1024;
+
 /// What an update's reading met.
 #[derive(Debug, Default)]
 pub(super) struct Arrivals {
-    /// Faults that did not end it, each about rectangles that stay missing.
-    pub(super) faults: Vec<Error>,
-    wanted: Vec<(u32, Rect)>,
+    faults: Faults,
+    wanted: Vec<Wanted>,
+    /// Whether the last that `levels` heard was that something is wanted.
+    wants: bool,
+}
+
+/// Faults that did not end an update, each about rectangles that stay missing.
+#[derive(Debug, Default)]
+pub(super) struct Faults {
+    /// Those that nobody has taken yet.
+    kept: Vec<Error>,
+    said: HashSet<String>,
+}
+
+impl Faults {
+    /// Keeps a fault, unless it was said before: new ground of a damaged tile says it again.
+    pub(super) fn push(&mut self, fault: Error) {
+        if self.said.len() < MOST_FAULTS && self.said.insert(fault.to_string()) {
+            self.kept.push(fault);
+        }
+    }
+}
+
+/// Where the eye is, and where it is going.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Course<'a> {
+    pub(super) eye: &'a Eye,
+    /// Where it will be in a moment, if it goes on like that.
+    pub(super) ahead: Eye,
 }
 
 impl Clone for Arrivals {
@@ -38,16 +69,30 @@ impl Clone for Arrivals {
 }
 
 impl Arrivals {
+    /// Takes the faults that were met since the last call.
+    pub(super) fn take_faults(&mut self) -> Vec<Error> {
+        std::mem::take(&mut self.faults.kept)
+    }
+
     /// Reads all that `windows` miss, and lists what is written in `plan`.
     ///
     /// # Errors
     /// Those of `levels`, and [`ErrorKind::Unsupported`] where it answers without the data.
     pub(super) fn all(
+        &mut self,
         levels: &dyn Levels,
         windows: &mut [Window],
         plan: &mut UpdatePlan,
         scratch: &mut Scratch,
     ) -> Result<()> {
+        self.wanted.clear();
+        for written in plan.levels_mut() {
+            let window = &windows[written.level as usize];
+            for rect in window.missing.waiting() {
+                window.wants(*rect, levels.has_light(), &mut self.wanted);
+            }
+        }
+        self.ask(levels);
         for written in plan.levels_mut() {
             let window = &mut windows[written.level as usize];
             each(window, |window, rect| {
@@ -76,28 +121,46 @@ impl Arrivals {
         windows: &mut [Window],
         plan: &mut UpdatePlan,
         scratch: &mut Scratch,
-        eye: &Eye,
+        course: &Course<'_>,
         budget_bytes: Option<u64>,
     ) -> Result<()> {
         let coarsest = windows.len() as u32 - 1;
         let mut left_bytes = budget_bytes.unwrap_or(u64::MAX);
+        let has_light = levels.has_light();
         self.wanted.clear();
         for written in plan.levels_mut() {
             let window = &mut windows[written.level as usize];
-            let at = eye.samples().map(|s| s / (1i64 << written.level) as f64);
+            let at = course.ahead.samples().map(|s| s / (1i64 << written.level) as f64);
             window.missing.by_tile(TILE, at);
-            let level = written.level;
-            self.wanted
-                .extend(window.missing.waiting().iter().map(|r| (level, *r)));
+            for rect in window.missing.waiting() {
+                window.wants(*rect, has_light, &mut self.wanted);
+            }
         }
-        if !self.wanted.is_empty() {
-            levels.want(&self.wanted);
+        // Then what the windows will gain in a moment.
+        for written in plan.levels_mut() {
+            let window = &windows[written.level as usize];
+            let target = window.target(&course.ahead);
+            // A level that the eye leaves behind at that speed has nothing to gain.
+            if target.intersection(window.resident()).is_empty() {
+                continue;
+            }
+            for rect in target.difference(window.resident()) {
+                window.wants(rect, has_light, &mut self.wanted);
+            }
         }
+        self.ask(levels);
         let faults = &mut self.faults;
         for written in plan.levels_mut() {
             let window = &mut windows[written.level as usize];
-            let at = eye.samples().map(|s| s / (1i64 << written.level) as f64);
+            let at = course.eye.samples().map(|s| s / (1i64 << written.level) as f64);
+            let first = window.level() == coarsest && written.from.is_empty();
             each(window, |window, rect| {
+                if first {
+                    // Nothing can be drawn before it is there.
+                    self.wanted.clear();
+                    window.wants(rect, has_light, &mut self.wanted);
+                    levels.wait_for(&self.wanted);
+                }
                 let limit = if window.level() == coarsest {
                     u64::MAX
                 } else {
@@ -122,6 +185,14 @@ impl Arrivals {
             })?;
         }
         Ok(())
+    }
+
+    /// Tells `levels` what is wanted, and once that nothing is.
+    fn ask(&mut self, levels: &dyn Levels) {
+        if self.wants || !self.wanted.is_empty() {
+            levels.want(&self.wanted);
+        }
+        self.wants = !self.wanted.is_empty();
     }
 }
 

@@ -20,8 +20,17 @@ impl Extent<'_> {
     pub(super) fn of(&self, level: u32, ends: Rect, heights: [f32; 2]) -> [DVec3; 2] {
         let x = [ends.x0, ends.x1].map(|i| self.along(0, i << level));
         let z = [ends.z0, ends.z1].map(|j| self.along(1, j << level));
-        let [a, b] = heights.map(|h| self.up(h));
+        let [a, b] = heights.map(|h| self.up(f64::from(h)));
         [DVec3::new(x[0], a.min(b), z[0]), DVec3::new(x[1], a.max(b), z[1])]
+    }
+
+    /// The place of sample (i, j) of level `level` at a height in metres above the DEM's base.
+    pub(super) fn place(&self, level: u32, [i, j]: [i64; 2], height_m: f64) -> DVec3 {
+        DVec3::new(
+            self.along(0, i << level),
+            self.up(height_m),
+            self.along(1, j << level),
+        )
     }
 
     /// Metres east or south of the eye to a column or row of level 0: from the integer anchor first, which is exact
@@ -30,11 +39,11 @@ impl Extent<'_> {
         ((index - self.eye.anchor[axis]) as f64 - self.eye.fraction[axis]) * self.grid.spacing_m[axis]
     }
 
-    fn up(&self, height: f32) -> f64 {
+    fn up(&self, height_m: f64) -> f64 {
         if self.vertical_scale == 0.0 {
             0.0 // an unknown height is infinite
         } else {
-            (f64::from(height) - self.eye.height_m) * self.vertical_scale
+            (height_m - self.eye.height_m) * self.vertical_scale
         }
     }
 }

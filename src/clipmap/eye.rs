@@ -51,6 +51,20 @@ impl Eye {
         ]
     }
 
+    /// Where the eye will be in `ahead_s` seconds, if it goes on as it has since it was at `last`, in samples of level 0,
+    /// `passed_s` seconds ago; where it is, if no time has passed. Heights stay.
+    pub(super) fn ahead(&self, last: [f64; 2], passed_s: f64, ahead_s: f64) -> Self {
+        let mut eye = *self;
+        if passed_s > 0.0 {
+            for (axis, at) in self.samples().into_iter().enumerate() {
+                let moved = (at - last[axis]) / passed_s * ahead_s;
+                let there = (at + moved).clamp(-FAR_SAMPLES * 256.0, FAR_SAMPLES * 256.0);
+                (eye.anchor[axis], eye.fraction[axis]) = (there.floor() as i64, there - there.floor());
+            }
+        }
+        eye
+    }
+
     /// The height as the sum of two f32, so that heights near it subtract without loss.
     pub fn height_high_low(&self) -> [f32; 2] {
         let high = self.height_m as f32;
@@ -84,6 +98,14 @@ mod tests {
             ([99 + (1 << 23), -(1 << 23)], [0.0, 0.0]),
             "the last that are near"
         );
+    }
+
+    #[test]
+    fn an_eye_goes_on_as_it_went() {
+        let e = eye(20.0, 40.0);
+        let last = [9.0, 10.0];
+        assert_eq!(e.ahead(last, 0.5, 1.0).samples(), [12.0, 10.0]);
+        assert_eq!(e.ahead(last, 0.0, 1.0), e);
     }
 
     #[test]

@@ -5,14 +5,25 @@ use glam::DVec3;
 use crate::camera::View;
 
 /// The share of a box's extent by which it must lie outside a plane: far more than f32 loses of a position on its way
-/// to the screen (a handful of roundings of 2^-24 each), so that culling never changes a picture.
+/// to the screen (a handful of roundings of 2^-24 each), so that culling never changes a picture. The extent is that of the
+/// two clip coordinates that the plane compares: what cancels between them is rounded all the same.
 const SLACK: f64 = 1e-5;
 
 /// The planes of a view, in metres east, up and south of the eye.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frustum {
-    /// Inward normals, and how far inside the eye is along each: the sides go through it, the near plane lies ahead.
-    planes: [(DVec3, f64); 6],
+    /// The sides go through the eye, the near plane lies ahead.
+    planes: [Plane; 6],
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Plane {
+    /// Inward.
+    normal: DVec3,
+    /// What a step along each axis may add to the two clip coordinates that it compares.
+    extent: DVec3,
+    /// How far inside the eye is along the normal.
+    inside: f64,
 }
 
 impl Frustum {
@@ -23,14 +34,19 @@ impl Frustum {
         let (near_m, far_m) = view
             .depth()
             .map_or((0.0, f64::INFINITY), |d| (d.near_m(), d.far_m()));
+        let plane = |normal: DVec3, other: DVec3, inside| Plane {
+            normal: normal + other,
+            extent: normal.abs() + other.abs(),
+            inside,
+        };
         Self {
             planes: [
-                (w, -near_m),
-                (w - x, 0.0),
-                (w + x, 0.0),
-                (w - y, 0.0),
-                (w + y, 0.0),
-                (-w, far_m),
+                plane(w, DVec3::ZERO, -near_m),
+                plane(w, -x, 0.0),
+                plane(w, x, 0.0),
+                plane(w, -y, 0.0),
+                plane(w, y, 0.0),
+                plane(-w, DVec3::ZERO, far_m),
             ],
         }
     }
@@ -38,17 +54,30 @@ impl Frustum {
     /// Whether the box from `low` to `high` (metres from the eye) is seen nowhere. Infinite extents are never outside
     /// by their infinite side.
     pub fn excludes(&self, low: DVec3, high: DVec3) -> bool {
-        self.planes.iter().any(|&(normal, inside)| {
-            let (mut inward, mut extent) = (inside, inside.abs());
+        self.planes.iter().any(|plane| {
+            let (mut inward, mut extent) = (plane.inside, plane.inside.abs());
             for axis in 0..3 {
-                if normal[axis] == 0.0 {
+                if plane.extent[axis] == 0.0 {
                     continue; // 0 times an infinite extent would be NaN
                 }
-                inward += (normal[axis] * low[axis]).max(normal[axis] * high[axis]);
-                extent += normal[axis].abs() * low[axis].abs().max(high[axis].abs());
+                extent += plane.extent[axis] * low[axis].abs().max(high[axis].abs());
+                if plane.normal[axis] != 0.0 {
+                    inward += (plane.normal[axis] * low[axis]).max(plane.normal[axis] * high[axis]);
+                }
             }
             inward < -SLACK * extent
         })
+    }
+
+    /// A bit for each plane that a point lies outside of, by the same share of its own extent. What hangs together
+    /// between points that lie outside one plane is seen nowhere: inwardness is linear, and their extents add up to at
+    /// least its own.
+    pub(super) fn outside(&self, point: DVec3) -> u8 {
+        let bit = |(k, plane): (usize, &Plane)| {
+            let extent = plane.inside.abs() + plane.extent.dot(point.abs());
+            u8::from(plane.normal.dot(point) + plane.inside < -SLACK * extent) << k
+        };
+        self.planes.iter().enumerate().map(bit).sum()
     }
 }
 
@@ -73,19 +102,35 @@ mod tests {
                 DVec3::new(x + 1.0, 1.0, z + 1.0),
             )
         };
-        let excludes = |(low, high)| frustum.excludes(low, high);
+        let excludes = |(low, high): (DVec3, DVec3)| {
+            let ends = |k: usize, bit: usize| if k >> bit & 1 == 0 { low } else { high };
+            let corners = (0..8).map(|k| DVec3::new(ends(k, 0).x, ends(k, 1).y, ends(k, 2).z));
+            let all = corners.map(|c| frustum.outside(c)).fold(u8::MAX, |a, b| a & b);
+            assert_eq!(all != 0, frustum.excludes(low, high), "{low} to {high}");
+            frustum.excludes(low, high)
+        };
         assert!(!excludes(cube(0.0, -10.0)), "ahead");
         assert!(excludes(cube(0.0, 10.0)), "behind");
         assert!(excludes(cube(30.0, -10.0)), "to the right");
         assert!(excludes(cube(-30.0, -10.0)), "to the left");
         assert!(!excludes(cube(10.5, -10.0)), "across the right plane");
         assert!(!excludes(cube(0.0, 0.0)), "around the eye");
+        // Turned by half its field of view a plane is level, but for what cancels.
+        let camera = Camera {
+            pitch_deg: -30.0,
+            fov_deg: 60.0,
+            ..camera
+        };
+        let tilted = Frustum::new(&View::new(camera, [100, 100]).unwrap());
+        let on_it = DVec3::new(0.0, 0.0, -100.0);
+        assert!(!tilted.excludes(on_it, on_it), "on a plane that cancels");
+        assert!(tilted.excludes(on_it + DVec3::Y, on_it + DVec3::Y), "above it");
         let (mut low, mut high) = cube(0.0, -10.0);
         (low.y, high.y) = (f64::NEG_INFINITY, f64::INFINITY);
-        assert!(!excludes((low, high)), "of unknown height ahead");
+        assert!(!frustum.excludes(low, high), "of unknown height ahead");
         let (mut low, mut high) = cube(0.0, 10.0);
         (low.y, high.y) = (f64::NEG_INFINITY, f64::INFINITY);
-        assert!(excludes((low, high)), "of unknown height behind");
+        assert!(frustum.excludes(low, high), "of unknown height behind");
     }
 
     #[test]

@@ -23,6 +23,7 @@ mod plan;
 mod relief;
 mod screen;
 mod selection;
+mod stray;
 mod vertex;
 mod window;
 
@@ -50,14 +51,17 @@ pub use window::{LightTexel, PatchInfo, Window};
 use crate::camera::View;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Grid;
-use crate::levels::{Arrival, Bounds, Levels};
-use arrivals::Arrivals;
+use crate::levels::{Arrival, Bounds, Data, Levels, Wanted};
+use arrivals::{Arrivals, Course};
 use extent::Extent;
 use ground::Ground;
 use held::{FadeReport, Moment};
 use identity::Identity;
 use need::Dial;
 use window::Scratch;
+
+/// Seconds of flight for which what windows will gain is wanted beforehand, without waiting.
+const AHEAD_S: f64 = 1.0;
 
 /// What an update did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -275,11 +279,16 @@ impl Clipmap {
         (self.last_eye, self.last_time_s) = (Some(samples), Some(time_s));
         let (windows, plan, scratch) = (&mut self.windows, &mut self.plan, &mut self.scratch);
         if self.wait == Wait::All {
-            Arrivals::all(levels, windows, plan, scratch)?;
+            self.arrivals.all(levels, windows, plan, scratch)?;
             return Ok(FadeReport::default());
         }
         let budget = self.upload_budget_bytes;
-        self.arrivals.some(levels, windows, plan, scratch, eye, budget)?;
+        let course = Course {
+            eye,
+            ahead: eye.ahead(last_eye, passed_s, AHEAD_S),
+        };
+        self.arrivals
+            .some(levels, windows, plan, scratch, &course, budget)?;
         let moment = Moment {
             grid: &self.grid,
             eye,
@@ -293,7 +302,7 @@ impl Clipmap {
     /// Takes the faults that updates without waiting have met since the last call: data that are damaged or cannot
     /// be read, in whose place the next coarser level is drawn.
     pub fn take_faults(&mut self) -> Vec<Error> {
-        std::mem::take(&mut self.arrivals.faults)
+        self.arrivals.take_faults()
     }
 
     /// A number that no other clipmap of this process has, clones included.
@@ -421,6 +430,11 @@ pub fn height_range_m(levels: &dyn Levels) -> Result<[f32; 2]> {
     let coarsest = levels.level_count() - 1;
     let patches = levels.grid().patches(coarsest).rect();
     let mut bounds = vec![Bounds::VOID; patches.area() as usize];
+    levels.wait_for(&[Wanted {
+        data: Data::Bounds,
+        level: coarsest,
+        rect: patches,
+    }]);
     if levels.bounds(coarsest, patches, &mut bounds)? == Arrival::Missing {
         let what = "the bounds of its coarsest level are not there";
         return Err(Error::new(ErrorKind::Unsupported, "terrain", what).advice("wait for them first"));

@@ -1,31 +1,39 @@
-//! What a vertical segment spans on the screen, bounded over all places of a box.
+//! What a vertical segment spans on the screen, bounded over all places of a box or of a triangle.
 //!
-//! A segment stands at horizontal distance h from the eye; one end P lies in the box at distance z along the view axis,
+//! A segment stands at horizontal distance h from the eye; one end P is seen at distance z along the view axis,
 //! the other, Q, at most e metres above or below it. With u the unit vector up, s the signed length and W the axis (a
 //! unit vector), the screen positions differ by `s (x, y) / (z (z + s W.u))`, where x and y are two products of the
-//! shape `(X.P) (W.u) - (X.u) (W.P) = (X x W).(P x u)` and X is the row of clip x or y in pixels. `P x u` is horizontal
-//! and as long as h. The rows `X x W` map it to the screen; with f the greatest stretch of that map (the focal length
-//! in pixels where pixels are square) the segment spans at most
+//! shape `(X.P) (W.u) - (X.u) (W.P) = (X x W).(P x u)` and X is the row of clip x or y in pixels. The rows `X x W` map
+//! what of `P x u` is at right angles to W to the screen, with f the greatest stretch of that map (the focal length in
+//! pixels where pixels are square). `P x u` is horizontal and as long as h. Along W it is `P.(u x W) = c b`, with c the length of W', what of
+//! W is horizontal, and b how far P is beside the vertical plane through the axis; as `h^2 = (P.W' / c)^2 + b^2` and
+//! `c^2 + (W.u)^2 = 1`, what is left is `n^2 = h^2 - c^2 b^2 = (P.W')^2 + (W.u)^2 h^2`. So the segment spans at most
 //!
-//! `f e h / (z (z - e |W.u|))` pixels, infinite where the bracket is not positive.
+//! `f e n / (z (z - e |W.u|))` pixels, infinite where the bracket is not positive, and n is at most h.
 //!
 //! *Over a box.* z is at least z0, the greater of the least value that `W.P` takes in the box and of a bound that the
 //! caller knows; and where P is seen, at least kappa r, with r its distance and kappa the cosine of the widest angle
 //! between the axis and a place of the picture. With y the least `|P.y|` in the box, r is at least `sqrt(h^2 + y^2)`. So
-//! z is at least `Z(h) = max(z0, kappa sqrt(h^2 + y^2))`, which grows with h, over the h0 to h1 of the box:
+//! z is at least `Z(h) = max(z0, kappa sqrt(h^2 + y^2))`, which grows with h, over the h0 to h1 of the box. The least of
+//! two bounds is taken:
 //!
-//! `f e h / (z (z - e |W.u|)) <= f e (h / Z(h)^2) (Z(h0) / (Z(h0) - e |W.u|))`,
+//! 1. `f e n / (z (z - e |W.u|)) <= f e (h / Z(h)^2) (Z(h0) / (Z(h0) - e |W.u|))`, as `z / (z - e |W.u|)` falls with z.
+//!    `h / Z^2` rises while Z is z0 and while `h <= y`, and falls beyond both: its greatest value is at
+//!    `max(y, sqrt((z0 / kappa)^2 - y^2))`, clamped to h0 to h1. It is good for what is large or near.
+//! 2. `f e N / (Z(h0) (Z(h0) - e |W.u|))` with N the greatest n. n is the length of a linear function of P, thus convex:
+//!    greatest at a corner. It is good for what is small for its distance, and to the picture's sides.
 //!
-//! as `z / (z - e |W.u|)` falls with z. `h / Z^2` rises while Z is z0 and while `h <= y`, and falls beyond both: its
-//! greatest value is at `max(y, sqrt((z0 / kappa)^2 - y^2))`, clamped to h0 to h1.
+//! *Over a triangle* the same, z0 the least of its corners' distances along the axis. What all lies outside one plane
+//! of the frustum is not seen.
 //!
-//! *It nests.* For a box within another and an e not above the other's, h0, y, z0 are not below and h1 and e not above
-//! the other's: every factor is at most the other's, and if the other's e is g times as great the bound is at least g
-//! times as great. It is continuous in eye, rotation, box and e, and rises to infinity without a jump. The dial rests
+//! *It nests.* For a box within another and an e not above the other's, h0, y, z0 are not below and h1, N and e not
+//! above the other's: every factor is at most the other's, and if the other's e is g times as great the bounds are at least
+//! g times as great. They are continuous in eye, rotation, box and e, and rise to infinity without a jump. The dial rests
 //! on both.
 
 use glam::DVec3;
 
+use super::frustum::Frustum;
 use super::near_of_m;
 use crate::camera::View;
 use crate::grid::Grid;
@@ -41,6 +49,28 @@ pub struct Screen {
     kappa: f64,
     /// Nearest drawn distance along the axis in metres.
     near_m: f64,
+    frustum: Frustum,
+}
+
+/// A point as [`Screen`] sees it, in metres from the eye.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sight {
+    point: DVec3,
+    /// Along the view axis.
+    away_m: f64,
+    /// h, and n of the head of this file.
+    level_m: f64,
+    across_m: f64,
+    /// A bit for each plane of the frustum that it lies outside of.
+    outside: u8,
+}
+
+/// What the bounds go by, over the places of a box or triangle: the names of the head of this file.
+struct Places {
+    h: [f64; 2],
+    y: f64,
+    z0: f64,
+    n: f64,
 }
 
 impl Screen {
@@ -60,34 +90,90 @@ impl Screen {
             axis,
             kappa: 1.0 / lengths.into_iter().fold(0.0, f64::max),
             near_m: near_of_m(view, grid),
+            frustum: Frustum::new(view),
         }
     }
 
     /// The most pixels that a segment spans of which one end is *seen* in the box from `low` to `high` (metres east, up
     /// and south of the eye, as drawn) and the other is at most `error_m` above or below it.
     pub fn seen_px(&self, low: DVec3, high: DVec3, error_m: f64) -> f64 {
-        self.span_px(low, high, error_m, self.near_m)
+        if self.frustum.excludes(low, high) {
+            return 0.0;
+        }
+        self.span_px(&self.of_box(low, high, self.near_m), error_m)
     }
 
     /// The same as if all directions were seen as the picture's corners are, and without a near plane: continuous in
     /// eye and rotation.
     pub fn nearby_px(&self, low: DVec3, high: DVec3, error_m: f64) -> f64 {
-        self.span_px(low, high, error_m, 0.0)
+        self.span_px(&self.of_box(low, high, 0.0), error_m)
     }
 
-    fn span_px(&self, low: DVec3, high: DVec3, error_m: f64, least_m: f64) -> f64 {
-        if error_m == 0.0 {
+    /// The same for an end that is seen on a triangle or any other hull of `corners`.
+    pub(super) fn seen_among_px(&self, corners: &[Sight], error_m: f64) -> f64 {
+        if corners.iter().fold(u8::MAX, |all, c| all & c.outside) != 0 {
             return 0.0;
         }
+        let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (low, high) = corners
+            .iter()
+            .fold(start, |(low, high), c| (low.min(c.point), high.max(c.point)));
+        let least = |of: fn(&Sight) -> f64| corners.iter().map(of).fold(f64::INFINITY, f64::min);
+        let most = |of: fn(&Sight) -> f64| corners.iter().map(of).fold(0.0, f64::max);
+        let nearest = |axis: usize| low[axis].max(-high[axis]).max(0.0);
+        let places = Places {
+            h: [nearest(0).hypot(nearest(2)), most(|c| c.level_m)],
+            y: nearest(1),
+            z0: least(|c| c.away_m).max(self.near_m),
+            n: most(|c| c.across_m),
+        };
+        self.span_px(&places, error_m)
+    }
+
+    /// A point in metres east, up and south of the eye, as drawn.
+    pub(super) fn sight(&self, point: DVec3) -> Sight {
+        let level_m = point.x.hypot(point.z);
+        Sight {
+            point,
+            away_m: self.axis.dot(point),
+            level_m,
+            across_m: self.across_m(point.x, point.z, level_m),
+            outside: self.frustum.outside(point),
+        }
+    }
+
+    /// n at a place east and south of the eye, of which h is known.
+    fn across_m(&self, east: f64, south: f64, level_m: f64) -> f64 {
+        (self.axis.x * east + self.axis.z * south).hypot(self.axis.y * level_m)
+    }
+
+    fn of_box(&self, low: DVec3, high: DVec3, least_m: f64) -> Places {
         let nearest = |axis: usize| low[axis].max(-high[axis]).max(0.0);
         let farthest = |axis: usize| high[axis].max(-low[axis]);
         let along = |axis: usize| match self.axis[axis] {
             0.0 => 0.0, // times an infinite extent it would be NaN
             a => (a * low[axis]).min(a * high[axis]),
         };
-        let (h0, h1) = (nearest(0).hypot(nearest(2)), farthest(0).hypot(farthest(2)));
-        let y = nearest(1);
-        let z0 = (along(0) + along(1) + along(2)).max(least_m);
+        let corners = [(low.x, low.z), (low.x, high.z), (high.x, low.z), (high.x, high.z)];
+        let across = corners.map(|(x, z)| self.across_m(x, z, x.hypot(z)));
+        Places {
+            h: [nearest(0).hypot(nearest(2)), farthest(0).hypot(farthest(2))],
+            y: nearest(1),
+            z0: (along(0) + along(1) + along(2)).max(least_m),
+            n: across.into_iter().fold(0.0, f64::max),
+        }
+    }
+
+    fn span_px(&self, places: &Places, error_m: f64) -> f64 {
+        if error_m == 0.0 {
+            return 0.0;
+        }
+        let &Places {
+            h: [h0, h1],
+            y,
+            z0,
+            n,
+        } = places;
         let z = |h: f64| z0.max(self.kappa * h.hypot(y));
         let lean_m = error_m * self.axis.y.abs();
         let first = z(h0);
@@ -97,7 +183,9 @@ impl Screen {
         let kink = ((z0 / self.kappa).powi(2) - y * y).max(0.0).sqrt();
         let h = kink.max(y).clamp(h0, h1);
         let z = z(h);
-        self.focal_px * error_m * (h / z) / z * (first / (first - lean_m))
+        let by_distance = (h / z) / z * (first / (first - lean_m));
+        let by_place = (n / first) / (first - lean_m);
+        self.focal_px * error_m * by_distance.min(by_place)
     }
 }
 

@@ -336,15 +336,24 @@ impl Scene<'_> {
         }
     }
 
-    /// Low and high corner of a patch's box, in metres from the eye as drawn.
-    pub(super) fn patch_box(&self, patch: Patch, heights: [f32; 2]) -> [DVec3; 2] {
-        let extent = Extent {
+    fn extent(&self) -> Extent<'_> {
+        Extent {
             grid: self.grid,
             eye: self.eye,
             vertical_scale: self.vertical_scale,
-        };
+        }
+    }
+
+    /// Low and high corner of a patch's box, in metres from the eye as drawn.
+    pub(super) fn patch_box(&self, patch: Patch, heights: [f32; 2]) -> [DVec3; 2] {
         let (x, z) = (patch.a * PATCH, patch.b * PATCH);
-        extent.of(patch.level, Rect::new(x, z, x + PATCH, z + PATCH), heights)
+        let ground = Rect::new(x, z, x + PATCH, z + PATCH);
+        self.extent().of(patch.level, ground, heights)
+    }
+
+    /// Where sample (i, j) of `level` is drawn that is `height_m` above the DEM's base, in metres from the eye.
+    pub(super) fn place(&self, level: u32, at: [i64; 2], height_m: f64) -> DVec3 {
+        self.extent().place(level, at, height_m)
     }
 
     fn unseen(&self, patch: Patch, heights: [f32; 2]) -> bool {

@@ -2,6 +2,7 @@
 
 use half::f16;
 
+use super::arrivals::Faults;
 use super::constants::{Ring, VOID_HEIGHT, light_level};
 use super::eye::Eye;
 use super::missing::Missing;
@@ -9,7 +10,7 @@ use super::plan::LevelPlan;
 use super::relief;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, PATCH, Patch, Rect, Size, seam_pieces, slot};
-use crate::levels::{Arrival, Bounds, Levels};
+use crate::levels::{Arrival, Bounds, Data, Levels, Wanted};
 
 /// What a window knows of a patch.
 #[derive(Clone, Copy, Debug)]
@@ -204,6 +205,28 @@ impl Window {
         self.patch_resident = patches;
     }
 
+    /// Adds to `wanted` what [`Window::fill`] will ask for to read `rect`.
+    pub(super) fn wants(&self, rect: Rect, has_light: bool, wanted: &mut Vec<Wanted>) {
+        let (level, fine) = (self.level, light_level(self.level));
+        let mut add = |data, level, rect: Rect| {
+            if !rect.is_empty() {
+                wanted.push(Wanted { data, level, rect });
+            }
+        };
+        add(Data::Bounds, level, rect.touching_patches(self.size));
+        add(Data::Heights, level, rect);
+        let light = self.light_of(rect);
+        if has_light {
+            add(Data::Light, fine, light);
+        }
+        // For the slopes.
+        add(
+            Data::Heights,
+            fine,
+            light.grown(1).intersection(self.light_level_size.rect()),
+        );
+    }
+
     /// Reads the samples `rect`, which must be missing, with their light and the bounds of their patches, into the
     /// mirror; where they arrive, lists the rectangles that were written, split at the seams. Whoever calls takes
     /// `rect` from what is missing.
@@ -219,7 +242,7 @@ impl Window {
         rect: Rect,
         written: &mut LevelPlan,
         scratch: &mut Scratch,
-        mut faults: Option<&mut Vec<Error>>,
+        mut faults: Option<&mut Faults>,
     ) -> Result<Arrival> {
         let patches = rect.touching_patches(self.size).intersection(self.patch_resident);
         let unknown = |(a, b)| self.patches[self.patch_index(a, b)].is_none();

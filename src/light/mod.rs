@@ -1,6 +1,6 @@
 //! Light on the terrain: the sun's share and the sky's share of every sample, traced over the DEM's surface.
 //!
-//! `horizon` finds how high the terrain stands in a direction, `sun` and `sky` make light of it, `fill`
+//! `rays` and `relief` find how high the terrain stands in a direction, `sun` and `sky` make light of it, `fill`
 //! spreads it under voids, and [`light_levels`] filters it into levels like the heights. All of it is traced
 //! over `S0`, level 0; no data, and what lies beyond the DEM, neither casts a shadow nor blocks the sky.
 //!
@@ -14,11 +14,13 @@ use crate::grid::{Grid, Size};
 use crate::levels::LightSample;
 use crate::progress::Progress;
 use crate::pyramid::{Filter, downsample};
-use crate::work::Work;
+use crate::work::{Work, each_chunk};
 
 mod fill;
 mod horizon;
 mod normal;
+mod rays;
+mod relief;
 mod sky;
 mod sun;
 
@@ -32,6 +34,9 @@ pub const DEFAULT_SKY_DIRECTIONS: u32 = 16;
 
 /// Rows in a band: the unit of work.
 const BAND: usize = 16;
+
+/// Samples that are rounded at once.
+const CHUNK: usize = 1 << 16;
 
 /// What light is traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,7 +117,9 @@ pub fn light_levels(
             .zip(heights)
             .filter(|(_, h)| h.is_nan())
             .for_each(|(s, _)| *s = f32::NAN);
-        fill_voids(&mut share, grid.size);
+        if share.iter().any(|s| s.is_nan()) {
+            fill_voids(&mut share, grid.size);
+        }
         share.iter_mut().for_each(|s| *s = s.clamp(0.0, 1.0));
         share
     };
@@ -121,15 +128,27 @@ pub fn light_levels(
     for l in 0..count {
         if l > 0 {
             for share in [&mut sun, &mut sky] {
+                // A share that is whole everywhere stays so, as every kernel's taps sum to 1.
+                if share.iter().all(|&s| s == 1.0) {
+                    share.truncate(grid.level(l).samples() as usize);
+                    progress.advance(grid.level(l).samples() as u64);
+                    continue;
+                }
                 *share = downsample(share, grid.level(l - 1), filter, None, work, progress)?;
                 share.iter_mut().for_each(|s| *s = s.clamp(0.0, 1.0));
             }
         }
-        let sample = |(&sun, &sky)| LightSample {
-            sun: f16::from_f32(sun),
-            sky: f16::from_f32(sky),
-        };
-        levels.push(sun.iter().zip(&sky).map(sample).collect());
+        let mut level = vec![LightSample::default(); sun.len()];
+        each_chunk(work, &mut level, CHUNK, |chunk, samples| {
+            let shares = sun[chunk * CHUNK..].iter().zip(&sky[chunk * CHUNK..]);
+            for (sample, (&sun, &sky)) in samples.iter_mut().zip(shares) {
+                *sample = LightSample {
+                    sun: f16::from_f32(sun),
+                    sky: f16::from_f32(sky),
+                };
+            }
+        });
+        levels.push(level);
     }
     Ok(levels)
 }

@@ -1,57 +1,146 @@
-//! The surface normal at a sample, by central differences.
+//! The surface normal at samples, by central differences.
 
+use super::relief::LANES;
 use crate::grid::Grid;
 
-/// The unit normal at valid sample (i, j) in the world (x east, y up, z south): central differences, one-sided
-/// at the DEM's edges and beside voids, level along an axis without a valid neighbour.
-pub(super) fn normal(heights: &[f32], grid: &Grid, i: usize, j: usize) -> [f64; 3] {
-    let (width, height) = (grid.size.width as usize, grid.size.height as usize);
-    let at = j * width + i;
-    let centre = f64::from(heights[at]);
-    let known = |inside: bool, at: usize| {
-        let h = if inside { f64::from(heights[at]) } else { f64::NAN };
-        (!h.is_nan()).then_some(h)
-    };
-    let slope = |before: Option<f64>, after: Option<f64>, spacing: f64| match (before, after) {
-        (Some(b), Some(a)) => (a - b) / (2.0 * spacing),
-        (None, Some(a)) => (a - centre) / spacing,
-        (Some(b), None) => (centre - b) / spacing,
-        (None, None) => 0.0,
-    };
-    let [dx, dz] = grid.spacing_m;
-    let east = slope(known(i > 0, at.wrapping_sub(1)), known(i + 1 < width, at + 1), dx);
-    let south = slope(
-        known(j > 0, at.wrapping_sub(width)),
-        known(j + 1 < height, at + width),
-        dz,
-    );
-    let length = (1.0 + east * east + south * south).sqrt();
-    [-east / length, 1.0 / length, -south / length]
+/// Slopes of the ground at samples.
+pub(super) struct Slopes<'a> {
+    heights: &'a [f32],
+    grid: &'a Grid,
+    /// One over twice the spacing.
+    per_two_m: [f32; 2],
+}
+
+impl<'a> Slopes<'a> {
+    /// The slopes of `heights`, as many as `grid` has samples.
+    pub(super) fn new(heights: &'a [f32], grid: &'a Grid) -> Self {
+        Self {
+            heights,
+            grid,
+            per_two_m: grid.spacing_m.map(|m| (0.5 / m) as f32),
+        }
+    }
+
+    /// By how much the ground rises a metre eastward and southward at each of at most [`LANES`] samples from (i, j)
+    /// eastward: central differences, one-sided at the DEM's edges and beside voids, level along an axis without a
+    /// valid neighbour. NaN at voids.
+    pub(super) fn rises(&self, [i, j]: [usize; 2], east: &mut [f32], south: &mut [f32]) {
+        let (width, height) = (self.grid.size.width as usize, self.grid.size.height as usize);
+        let (at, count) = (j * width + i, east.len());
+        if i > 0 && i + count < width && j > 0 && j + 1 < height {
+            let row = &self.heights[at - 1..at + count + 1];
+            let (north, below) = (&self.heights[at - width..], &self.heights[at + width..]);
+            for l in 0..count {
+                let whole = row[l + 1] - row[l + 1];
+                east[l] = (row[l + 2] - row[l]) * self.per_two_m[0] + whole;
+                south[l] = (below[l] - north[l]) * self.per_two_m[1] + whole;
+            }
+        } else {
+            east.fill(f32::NAN);
+            south.fill(f32::NAN);
+        }
+        for l in 0..count {
+            if (east[l] + south[l]).is_nan() {
+                [east[l], south[l]] = self.beside_gaps([i + l, j]);
+            }
+        }
+    }
+
+    /// Rises eastward and southward where neighbours may be missing.
+    #[cold]
+    fn beside_gaps(&self, [i, j]: [usize; 2]) -> [f32; 2] {
+        let (width, height) = (self.grid.size.width as usize, self.grid.size.height as usize);
+        let at = j * width + i;
+        let centre = self.heights[at];
+        if centre.is_nan() {
+            return [f32::NAN; 2];
+        }
+        let known = |inside: bool, at: usize| {
+            let h = if inside { self.heights[at] } else { f32::NAN };
+            (!h.is_nan()).then_some(h)
+        };
+        let slope = |before: Option<f32>, after: Option<f32>, per_two_m: f32| match (before, after) {
+            (Some(b), Some(a)) => (a - b) * per_two_m,
+            (None, Some(a)) => (a - centre) * 2.0 * per_two_m,
+            (Some(b), None) => (centre - b) * 2.0 * per_two_m,
+            (None, None) => 0.0,
+        };
+        let [columns, rows] = self.per_two_m;
+        [
+            slope(
+                known(i > 0, at.wrapping_sub(1)),
+                known(i + 1 < width, at + 1),
+                columns,
+            ),
+            slope(
+                known(j > 0, at.wrapping_sub(width)),
+                known(j + 1 < height, at + width),
+                rows,
+            ),
+        ]
+    }
+
+    /// The cosines between `direction`, a unit vector of the world (x east, y up, z south), and the normals at
+    /// samples from (i, j) eastward; NaN at voids.
+    pub(super) fn cosines(&self, at: [usize; 2], direction: [f32; 3], cosines: &mut [f32]) {
+        let (mut east, mut south) = ([0.0; LANES], [0.0; LANES]);
+        let (east, south) = (&mut east[..cosines.len()], &mut south[..cosines.len()]);
+        self.rises(at, east, south);
+        for ((cosine, e), s) in cosines.iter_mut().zip(&*east).zip(&*south) {
+            let length = (1.0 + e * e + s * s).sqrt();
+            *cosine = (direction[1] - e * direction[0] - s * direction[2]) / length;
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn rise(heights: &[f32], grid: &Grid, i: usize, j: usize) -> [f32; 2] {
+        let (mut east, mut south) = ([0.0], [0.0]);
+        Slopes::new(heights, grid).rises([i, j], &mut east, &mut south);
+        [east[0], south[0]]
+    }
+
     #[test]
-    fn a_plane_has_one_normal_edges_and_voids_included() {
-        let grid = Grid::new(5, 5, [2.0, 3.0]);
+    fn a_plane_has_one_slope_edges_and_voids_included() {
+        let grid = Grid::new(19, 5, [2.0, 4.0]);
         let mut heights: Vec<f32> = grid
             .size
             .rect()
             .cells()
-            .map(|(x, z)| (4 * x - 3 * z) as f32)
+            .map(|(x, z)| (4 * x - 2 * z) as f32)
             .collect();
-        heights[12] = f32::NAN;
-        for at in (0..25).filter(|&at| at != 12) {
-            let n = normal(&heights, &grid, at % 5, at / 5);
-            let want = [-2.0, 1.0, 1.0].map(|c: f64| c / 6f64.sqrt());
-            assert!(
-                n.iter().zip(want).all(|(n, w)| (n - w).abs() < 1e-12),
-                "{at}: {n:?}"
-            );
+        heights[2 * 19 + 7] = f32::NAN;
+        for (i, j) in (0..19).flat_map(|i| (0..5).map(move |j| (i, j))) {
+            let got = rise(&heights, &grid, i, j);
+            if (i, j) == (7, 2) {
+                assert!(got[0].is_nan() && got[1].is_nan());
+            } else {
+                assert_eq!(got, [2.0, -0.5], "({i}, {j})");
+            }
         }
         let lone = [f32::NAN, 3.0, f32::NAN];
-        assert_eq!(normal(&lone, &Grid::new(3, 1, [1.0, 1.0]), 1, 0), [0.0, 1.0, 0.0]);
+        assert_eq!(rise(&lone, &Grid::new(3, 1, [1.0, 1.0]), 1, 0), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn samples_at_once_have_the_slopes_of_each_alone() {
+        let grid = Grid::new(30, 7, [3.0, 5.0]);
+        let mut heights = crate::pyramid::random::Random::new(3).heights(210, -90.0, 90.0, 0.2);
+        heights[3 * 30 + 11] = 5.0;
+        let slopes = Slopes::new(&heights, &grid);
+        for (i, j) in (0..30 - LANES).flat_map(|i| (0..7).map(move |j| (i, j))) {
+            let (mut east, mut south, mut cosines) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+            slopes.rises([i, j], &mut east, &mut south);
+            slopes.cosines([i, j], [0.6, 0.0, 0.8], &mut cosines);
+            for l in 0..LANES {
+                let [e, s] = rise(&heights, &grid, i + l, j);
+                assert_eq!([e, s].map(f32::to_bits), [east[l], south[l]].map(f32::to_bits));
+                let want = -(0.6 * e + 0.8 * s) / (1.0 + e * e + s * s).sqrt();
+                assert!(e.is_nan() == cosines[l].is_nan() && !((want - cosines[l]).abs() > 1e-6));
+            }
+        }
     }
 }

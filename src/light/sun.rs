@@ -1,7 +1,9 @@
 //! The sun's share: how much of its disc stands over the horizon, times the cosine of its incidence.
 
-use super::horizon::{Rays, Relief, direction, each_band};
-use super::normal::normal;
+use super::horizon::each_lanes;
+use super::normal::Slopes;
+use super::rays::{Rays, direction};
+use super::relief::{LANES, Relief};
 use super::{check, misuse};
 use crate::error::Result;
 use crate::grid::Grid;
@@ -87,31 +89,44 @@ pub fn sun_share(
     check(grid, heights.len())?;
     sun.check()?;
     progress.begin("sun", grid.size.height as u64);
-    let relief = Relief::new(heights, grid);
-    let rays = Rays::new(grid, sun.azimuth_deg);
-    let to_sun = sun.direction();
+    let mut shares = vec![0.0; heights.len()];
     let altitude = sun.altitude_deg.to_radians();
     let radius = (DISC_DEG / 2.0).to_radians();
+    let relief = Relief::new(heights, grid);
+    let rays = Rays::new(grid, sun.azimuth_deg, f64::INFINITY, 0.0);
+    let slopes = Slopes::new(heights, grid);
+    let to_sun = sun.direction().map(|c| c as f32);
     // Horizons below the disc hide nothing, those above it all. Beyond a right angle tangents turn negative.
-    let from = (altitude - radius).tan().max(0.0);
+    let from = (altitude - radius).tan().max(0.0) as f32;
     let until = if altitude + radius < std::f64::consts::FRAC_PI_2 {
-        (altitude + radius).tan()
+        (altitude + radius).tan() as f32
     } else {
-        f64::INFINITY
+        f32::INFINITY
     };
-    let mut shares = vec![f32::NAN; heights.len()];
-    each_band(&mut shares, grid, "sun", work, progress, |i, j, share| {
-        if heights[j * grid.size.width as usize + i].is_nan() {
-            return;
+    let sets = altitude <= -radius;
+    let lowest = disc_share(f64::from(from).atan(), altitude) as f32;
+    each_lanes(&mut shares, grid, "sun", work, progress, |[i, j], shares| {
+        let (mut cosines, mut tangents) = ([0.0; LANES], [f32::INFINITY; LANES]);
+        let (cosines, tangents) = (&mut cosines[..shares.len()], &mut tangents[..shares.len()]);
+        slopes.cosines([i, j], to_sun, cosines);
+        for (tangent, &cosine) in tangents.iter_mut().zip(&*cosines) {
+            // What turns away from the sun needs no ray.
+            if cosine > 0.0 && !sets {
+                *tangent = from;
+            }
         }
-        let n = normal(heights, grid, i, j);
-        let cosine = n[0] * to_sun[0] + n[1] * to_sun[1] + n[2] * to_sun[2];
-        *share = if cosine <= 0.0 || altitude <= -radius {
-            0.0
-        } else {
-            let tangent = relief.tangent(&rays, i, j, from, until);
-            (disc_share(tangent.atan(), altitude) * cosine).min(1.0) as f32
-        };
+        relief.raise(&rays, [i, j], until, tangents);
+        for ((share, &cosine), &tangent) in shares.iter_mut().zip(&*cosines).zip(&*tangents) {
+            *share = if cosine.is_nan() {
+                f32::NAN
+            } else if tangent == f32::INFINITY {
+                0.0
+            } else if tangent <= from {
+                (lowest * cosine).min(1.0)
+            } else {
+                ((disc_share(f64::from(tangent).atan(), altitude) as f32) * cosine).min(1.0)
+            };
+        }
     })?;
     Ok(shares)
 }

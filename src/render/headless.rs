@@ -1,5 +1,6 @@
 //! Frames without a window, through the same face that an embedding program uses.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::error_view::colour_errors;
@@ -69,7 +70,6 @@ pub struct Frame {
 }
 
 /// Draws frames of one terrain into memory.
-#[derive(Debug)]
 pub struct Headless {
     gpu: Gpu,
     options: HeadlessOptions,
@@ -81,7 +81,17 @@ pub struct Headless {
     timer: Option<Timer>,
     measuring: Option<MeasuringPass>,
     pool: Option<ErrorPool>,
+    truth: Option<Arc<dyn Levels>>,
     frames: u64,
+}
+
+impl std::fmt::Debug for Headless {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Headless")
+            .field("options", &self.options)
+            .field("clipmap", &self.clipmap.identity())
+            .finish_non_exhaustive()
+    }
 }
 
 #[derive(Debug)]
@@ -129,6 +139,7 @@ impl Headless {
                 .then(|| MeasuringPass::new(&gpu, options))
                 .transpose()?,
             pool: None,
+            truth: None,
             frames: 0,
             gpu,
             options: *options,
@@ -198,8 +209,13 @@ impl Headless {
         })
     }
 
+    /// What frames are measured against, where that is not the levels that they are drawn from: those do not wait.
+    pub fn set_truth(&mut self, truth: Arc<dyn Levels>) {
+        self.truth = Some(truth);
+    }
+
     /// Measures every frame from now on: [`Frame::measured`], from a second pass where there are several samples a pixel.
-    /// Levels must wait for their data.
+    /// Levels must wait for their data, or there must be a truth that does: [`Headless::set_truth`].
     ///
     /// # Errors
     /// [`ErrorKind::Limit`] where the system starts no threads.
@@ -224,7 +240,8 @@ impl Headless {
             return Ok(None);
         };
         let depths = pass.depths(&self.gpu, &self.clipmap, &self.textures, &self.targets.depth)?;
-        let errors = pass.errors(levels, &self.clipmap, view, &depths)?;
+        let truth = self.truth.as_deref().unwrap_or(levels);
+        let errors = pass.errors(truth, &self.clipmap, view, &depths)?;
         if self.options.view_mode == ViewMode::Error {
             colour_errors(&errors, rgba8);
         }

@@ -1,26 +1,100 @@
 //! A terrain to draw, from whatever a user names: a terrain file, a DEM, or procedural terrain.
 //!
-//! A terrain file is read tile by tile as windows ask for it. A DEM has no coarser levels, so its pyramid is built in
-//! memory first (without light); preprocessing it once is quicker from the second look on. Procedural terrain knows
-//! every level and needs neither.
+//! A terrain file is read tile by tile as windows ask for it, into a cache with a budget of bytes. A DEM has no coarser
+//! levels, so its pyramid is built in memory first (without light); preprocessing it once is quicker from the second look
+//! on. Procedural terrain knows every level and needs neither.
+//!
+//! A [`Terrain`] waits for what it is asked for. [`Terrain::arriving`] is the same terrain for a view that does not: what
+//! has not been loaded is missing there, and threads load it in the order in which it is wanted.
 
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::error::{Error, Result};
+mod arriving;
+mod shape;
+mod store;
+#[cfg(test)]
+mod tests;
+mod tiles;
+
+pub use arriving::Arriving;
+
+use self::tiles::{Patience, Tiles};
+use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
-use crate::levels::{Arrival, Bounds, Levels, LightSample};
+use crate::levels::{Arrival, Bounds, Data, Levels, LightSample, Wanted};
 use crate::light::Sun;
 use crate::progress::Progress;
 use crate::pyramid::Filter;
 use crate::source::{self, Description, Georeference, HeightSource, OpenOptions, ReadAt, Synth};
 use crate::terrain::{Meta, TerrainFile, is_terrain};
 
+/// Bytes of tiles that are kept where nothing else is said: 256 MiB.
+pub const DEFAULT_TILE_BYTES: usize = 256 << 20;
+
+/// The least budget for tiles, 32 MiB: with less, what a view must have at once might not fit.
+pub const LEAST_TILE_BYTES: usize = 32 << 20;
+
+/// Threads that load tiles, at most, where nothing else is said: beyond them decoding gains little.
+const LOADERS: usize = 4;
+
+/// Decoded tiles that the reader of a terrain file keeps beneath the tiles of views: those of its check parts.
+const READER_BYTES: usize = 4 << 20;
+
+/// Patches along a side of a tile of bounds in a terrain file.
+const FILE_BOUNDS_SIDE: i64 = crate::terrain::layout::TILE;
+
+/// The same where bounds are computed: over the ground of one tile of heights.
+const SYNTH_BOUNDS_SIDE: i64 = crate::terrain::layout::TILE / crate::grid::PATCH;
+
+/// How tiles are kept and loaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileOptions {
+    /// The most bytes of tiles that are kept, those that are being loaded included.
+    pub memory_bytes: usize,
+    /// Threads that load them. Frames that wait for their data do not depend on it.
+    pub loaders: usize,
+}
+
+impl Default for TileOptions {
+    fn default() -> Self {
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        Self {
+            memory_bytes: DEFAULT_TILE_BYTES,
+            loaders: processors.min(LOADERS),
+        }
+    }
+}
+
+impl TileOptions {
+    /// Refuses too small a budget, and no loaders.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`], naming the option.
+    pub fn check(&self) -> Result<()> {
+        if self.memory_bytes < LEAST_TILE_BYTES {
+            let what = format!("{} bytes of memory are too few for tiles", self.memory_bytes);
+            let advice = format!("give at least {} MiB", LEAST_TILE_BYTES >> 20);
+            return Err(Error::new(ErrorKind::Misuse, "tiles", what).advice(advice));
+        }
+        if self.loaders == 0 {
+            return Err(Error::new(
+                ErrorKind::Misuse,
+                "tiles",
+                "without loaders nothing arrives",
+            ));
+        }
+        Ok(())
+    }
+}
+
 /// A terrain, shared by any number of views.
 pub struct Terrain {
     name: String,
-    levels: Box<dyn Levels>,
+    levels: Arc<dyn Levels>,
     origin: Origin,
+    /// Where levels take a while to answer.
+    tiles: Option<Arc<Tiles>>,
 }
 
 /// What a terrain was made from.
@@ -90,13 +164,9 @@ impl Terrain {
     /// As [`Terrain::open`].
     pub fn from_bytes(name: &str, bytes: Arc<dyn ReadAt>, progress: &dyn Progress) -> Result<Self> {
         if is_terrain(bytes.as_ref()) {
-            let file = TerrainFile::open(name, bytes)?;
+            let file = TerrainFile::open(name, bytes)?.with_cache(READER_BYTES);
             let origin = Origin::File(Box::new(file.meta().clone()));
-            return Ok(Self {
-                name: name.to_string(),
-                levels: Box::new(file),
-                origin,
-            });
+            return Ok(Self::new(name.to_string(), Arc::new(file), origin));
         }
         Self::from_source(
             source::open_bytes(name, bytes, &OpenOptions::default())?.as_ref(),
@@ -111,20 +181,71 @@ impl Terrain {
     pub fn from_source(source: &dyn HeightSource, progress: &dyn Progress) -> Result<Self> {
         let pyramid = crate::build::build_pyramid(source, &Filter::default(), progress)?;
         let description = source.description().clone();
-        Ok(Self {
-            name: description.name.clone(),
-            levels: Box::new(pyramid),
-            origin: Origin::Dem(Box::new(description)),
-        })
+        let name = description.name.clone();
+        Ok(Self::new(
+            name,
+            Arc::new(pyramid),
+            Origin::Dem(Box::new(description)),
+        ))
     }
 
     /// Procedural terrain.
     pub fn from_synth(synth: Synth) -> Self {
         let description = HeightSource::description(&synth).clone();
-        Self {
-            name: description.name.clone(),
-            levels: Box::new(synth),
-            origin: Origin::Dem(Box::new(description)),
+        let name = description.name.clone();
+        Self::new(name, Arc::new(synth), Origin::Dem(Box::new(description)))
+    }
+
+    fn new(name: String, levels: Arc<dyn Levels>, origin: Origin) -> Self {
+        let terrain = Self {
+            name,
+            levels,
+            origin,
+            tiles: None,
+        };
+        terrain.with_default_tiles()
+    }
+
+    fn with_default_tiles(mut self) -> Self {
+        self.tiles = self.new_tiles(&TileOptions::default());
+        self
+    }
+
+    /// Keeps and loads tiles as `options` say; what was kept so far is let go.
+    ///
+    /// # Errors
+    /// Those of [`TileOptions::check`].
+    pub fn with_tiles(mut self, options: &TileOptions) -> Result<Self> {
+        options.check()?;
+        self.tiles = self.new_tiles(options);
+        Ok(self)
+    }
+
+    /// A pyramid in memory needs none.
+    fn new_tiles(&self, options: &TileOptions) -> Option<Arc<Tiles>> {
+        let side = match &self.origin {
+            Origin::File(_) => FILE_BOUNDS_SIDE,
+            Origin::Dem(description) if description.format == "synth" => SYNTH_BOUNDS_SIDE,
+            Origin::Dem(_) => return None,
+        };
+        Some(Arc::new(Tiles::new(self.levels.clone(), side, options)))
+    }
+
+    /// The same terrain for a view that does not wait: what has not been loaded is missing, and on its way.
+    pub fn arriving(&self) -> Arriving {
+        Arriving::new(self.levels.clone(), self.tiles.clone())
+    }
+
+    /// The most bytes of tiles that have been kept at once, those that were being loaded included.
+    pub fn most_tile_bytes(&self) -> usize {
+        self.tiles.as_ref().map_or(0, |tiles| tiles.most_bytes())
+    }
+
+    /// The tiles through which it answers itself: procedural terrain is quicker computed where it is asked for.
+    fn own_tiles(&self) -> Option<&Tiles> {
+        match &self.origin {
+            Origin::File(_) => self.tiles.as_deref(),
+            Origin::Dem(_) => None,
         }
     }
 
@@ -168,11 +289,17 @@ impl Levels for Terrain {
     }
 
     fn heights(&self, level: u32, rect: Rect, out: &mut [f32]) -> Result<Arrival> {
-        self.levels.heights(level, rect, out)
+        match self.own_tiles() {
+            Some(tiles) => tiles.copy(Data::Heights, level, rect, out, Patience::Retry),
+            None => self.levels.heights(level, rect, out),
+        }
     }
 
     fn bounds(&self, level: u32, patches: Rect, out: &mut [Bounds]) -> Result<Arrival> {
-        self.levels.bounds(level, patches, out)
+        match self.own_tiles() {
+            Some(tiles) => tiles.copy(Data::Bounds, level, patches, out, Patience::Retry),
+            None => self.levels.bounds(level, patches, out),
+        }
     }
 
     fn has_light(&self) -> bool {
@@ -180,11 +307,16 @@ impl Levels for Terrain {
     }
 
     fn light(&self, level: u32, rect: Rect, out: &mut [LightSample]) -> Result<Arrival> {
-        self.levels.light(level, rect, out)
+        match self.own_tiles() {
+            Some(tiles) if self.has_light() => tiles.copy(Data::Light, level, rect, out, Patience::Retry),
+            _ => self.levels.light(level, rect, out),
+        }
     }
 
-    fn want(&self, wanted: &[(u32, Rect)]) {
-        self.levels.want(wanted);
+    fn want(&self, wanted: &[Wanted]) {
+        if let Some(tiles) = self.own_tiles() {
+            tiles.want(0, wanted);
+        }
     }
 
     fn faults(&self) -> Vec<Error> {

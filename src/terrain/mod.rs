@@ -17,6 +17,7 @@ pub(crate) mod testing;
 mod tests;
 mod tile;
 mod writer;
+mod zip;
 
 pub use header::is_terrain;
 pub use layout::FORMAT_VERSION;

@@ -1,22 +1,19 @@
 //! Reading terrain files: an open [`TerrainFile`] is a [`Levels`].
 //!
-//! Opening reads the header and the offset tables; a tile is read, checked and decoded when it is asked for. Part
+//! Opening reads the header; a tile is read, checked and decoded when it is asked for, and so are the page of the
+//! offset tables and the tile of checks that it needs: what a file of any size takes in memory does not grow with it. Part
 //! and coordinates that stand before a tile must be those that were asked for, and its samples must have the
 //! CRC-32C that the file's check parts say. Decoded tiles are kept in a bounded cache, so rows and strips do not
 //! decode a tile more than once.
 
 use std::sync::Arc;
 
-use exr::block::UncompressedBlock;
-use exr::block::chunk::{Chunk, CompressedBlock, CompressedTileBlock, TileCoordinates};
-use exr::meta::MetaData;
-use exr::prelude::Vec2;
-
 use super::cache::Cache;
 use super::header;
 use super::layout::{Kind, Layout, Part};
 use super::meta::Meta;
-use super::tile::{BOUNDS_FIELDS, LIGHT_FIELDS, check, unpack};
+use super::tile::{BOUNDS_FIELDS, LIGHT_FIELDS, check, little_endian, unpack};
+use super::zip;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
 use crate::levels::{Arrival, Bounds, Levels, LightSample};
@@ -25,6 +22,12 @@ use crate::source::ReadAt;
 
 /// Decoded tiles that a [`TerrainFile`] keeps unless told otherwise: 64 MiB.
 pub const DEFAULT_CACHE_BYTES: usize = 64 << 20;
+
+/// Offsets in a page of the tables.
+const PAGE_OFFSETS: u64 = 512;
+
+/// Pages of the offset tables that are kept: 1 MiB, which is all of them for a DEM of 60,000 samples a side.
+const PAGES_BYTES: usize = 1 << 20;
 
 /// What stands before a tile's data: part, tile x and y, level x and y, length in bytes, each an i32.
 pub(super) const TILE_HEAD_BYTES: usize = 24;
@@ -35,41 +38,35 @@ pub struct TerrainFile {
     bytes: Arc<dyn ReadAt>,
     meta: Meta,
     layout: Layout,
-    exr: MetaData,
-    tables: Vec<Vec<u64>>,
+    /// Where each part's offset table begins.
+    tables_at: Vec<u64>,
+    pages: Cache,
     cache: Cache,
 }
 
 impl TerrainFile {
-    /// Opens the terrain file in `bytes`; messages call it `name`. Reads header and offset tables.
+    /// Opens the terrain file in `bytes`; messages call it `name`. Reads the header, and where the last tile stands.
     ///
     /// # Errors
     /// [`ErrorKind::Broken`] where it is damaged or cut short, [`ErrorKind::Unsupported`] where it is no terrain
     /// file or one of another version, and what `bytes` meet.
     pub fn open(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Self> {
         let (meta, layout, tables_at) = header::read(name, bytes.clone())?;
-        let exr = header::describe(&layout);
-        let mut at = tables_at;
-        let mut tables = Vec::with_capacity(layout.parts().len());
-        for part in layout.parts() {
-            // The header's reader has made sure that the file is long enough for all tables.
-            let mut table = vec![0u64; part.tiles().samples() as usize];
-            let raw: &mut [u8] = bytemuck::cast_slice_mut(&mut table);
-            bytes.read_exact_at(at, raw).map_err(|e| Error::io(name, e))?;
-            at += raw.len() as u64;
-            table
-                .iter_mut()
-                .for_each(|offset| *offset = u64::from_le(*offset));
-            tables.push(table);
-        }
+        // The header's reader has made sure that the file is long enough for all tables.
+        let starts = layout.parts().iter().scan(tables_at, |at, part| {
+            let start = *at;
+            *at += 8 * part.tiles().samples() as u64;
+            Some(start)
+        });
+        let tables_at = starts.collect();
         let cache = Cache::new(DEFAULT_CACHE_BYTES);
         let file = Self {
             name: name.into(),
             bytes,
             meta,
             layout,
-            exr,
-            tables,
+            tables_at,
+            pages: Cache::new(PAGES_BYTES),
             cache,
         };
         file.check_end()?;
@@ -129,10 +126,35 @@ impl TerrainFile {
         self.tile_head(last, tiles.width - 1, tiles.height - 1).map(drop)
     }
 
+    /// What the offset tables say of a tile.
+    fn offset(&self, part: usize, x: i64, y: i64) -> Result<u64> {
+        let tiles = self.layout.parts()[part].tiles();
+        let index = (y * tiles.width + x) as u64;
+        let page = index / PAGE_OFFSETS;
+        let key = (part, page as i64, 0);
+        let bytes = match self.pages.get(key) {
+            Some(bytes) => bytes,
+            None => {
+                let first = page * PAGE_OFFSETS;
+                let count = PAGE_OFFSETS.min(tiles.samples() as u64 - first);
+                let mut bytes = vec![0; 8 * count as usize];
+                self.bytes
+                    .read_exact_at(self.tables_at[part] + 8 * first, &mut bytes)
+                    .map_err(|e| self.unread(part, x, y, e))?;
+                let bytes = Arc::new(bytes);
+                self.pages.put(key, bytes.clone());
+                bytes
+            }
+        };
+        let at = 8 * (index % PAGE_OFFSETS) as usize;
+        let offset = bytes[at..at + 8].try_into().expect("a page holds whole offsets");
+        Ok(u64::from_le_bytes(offset))
+    }
+
     /// Where the data of a tile begin, and their length; checked against the file's length.
     fn tile_head(&self, part: usize, x: i64, y: i64) -> Result<(u64, usize)> {
         let description = &self.layout.parts()[part];
-        let offset = self.tables[part][(y * description.tiles().width + x) as usize];
+        let offset = self.offset(part, x, y)?;
         let file_bytes = self.bytes.size_bytes();
         let data = offset
             .checked_add(TILE_HEAD_BYTES as u64)
@@ -180,24 +202,14 @@ impl TerrainFile {
         self.bytes
             .read_exact_at(at, &mut compressed)
             .map_err(|e| self.unread(part, x, y, e))?;
-        let coordinates = TileCoordinates {
-            tile_index: Vec2(x as usize, y as usize),
-            level_index: Vec2(0, 0),
-        };
-        let block = CompressedTileBlock {
-            coordinates,
-            compressed_pixels_le: compressed,
-        };
-        let chunk = Chunk {
-            layer_index: part,
-            compressed_block: CompressedBlock::Tile(block),
-        };
-        let tile = UncompressedBlock::decompress_chunk(chunk, &self.exr, true)
-            .map_err(|e| self.broken(part, x, y, format!("cannot be decoded ({e})")))?
-            .data;
+        let description = &self.layout.parts()[part];
+        let most = description.bytes(description.tile_rect(x, y));
+        let tile = zip::decompress(compressed, most)
+            .map_err(|e| self.broken(part, x, y, format!("cannot be decoded ({e})")))?;
+        let tile = little_endian(tile, description.sample_bytes());
         if let Some(at) = self.layout.check_of(part, x, y) {
             let want = self.check_value(at.part, at.x, at.y, at.channel)?;
-            let found = check(&tile, self.layout.parts()[part].sample_bytes());
+            let found = check(&tile, description.sample_bytes());
             if found != want {
                 let place = self.layout.parts()[at.part].name();
                 let what = format!("is damaged: its CRC-32C is {found:08x}, {place} says {want:08x}");

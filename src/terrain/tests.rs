@@ -8,7 +8,7 @@ use super::layout::Layout;
 use super::testing::{Arrays, Look, Random, all_bits, first_tile, meta, open};
 use super::*;
 use crate::error::ErrorKind;
-use crate::grid::Rect;
+use crate::grid::{Grid, Rect};
 use crate::levels::Levels;
 use crate::progress::{Progress, Silent};
 use crate::source::ReadAt;
@@ -217,6 +217,113 @@ fn strips_do_not_decode_a_tile_for_every_row() {
             .heights(0, Rect::new(0, z, 600, z + 1), &mut [0.0; 600])
             .unwrap();
     }
-    // Nine tiles and the one that holds their checks.
-    assert_eq!(bytes.1.load(Ordering::Relaxed), 10);
+    // Nine tiles, the one that holds their checks, and a page of the offset table.
+    assert_eq!(bytes.1.load(Ordering::Relaxed), 11);
+}
+
+/// The beginning of a file and its last tile's head, nothing between; counts the bytes that are read.
+struct Ends {
+    pieces: Vec<(u64, Vec<u8>)>,
+    size_bytes: u64,
+    read: AtomicUsize,
+}
+
+impl ReadAt for Ends {
+    fn size_bytes(&self) -> u64 {
+        self.size_bytes
+    }
+
+    fn read_exact_at(&self, offset: u64, out: &mut [u8]) -> std::io::Result<()> {
+        self.read.fetch_add(out.len(), Ordering::Relaxed);
+        out.fill(0);
+        for (start, bytes) in &self.pieces {
+            for (at, byte) in (*start..).zip(bytes) {
+                if let Some(k) = at.checked_sub(offset).filter(|k| *k < out.len() as u64) {
+                    out[k as usize] = *byte;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn a_file_of_any_size_opens_without_its_index() {
+    let grid = Grid::new(1 << 20, 1 << 20, [1.0, 1.0]);
+    let layout = Layout::new(&grid, true).unwrap();
+    let header = header::to_bytes(&meta(grid, true), &header::describe(&layout)).unwrap();
+    let tables = 8 * layout.tile_count();
+    let last = layout.parts().len() - 1;
+    let tiles = layout.parts()[last].tiles();
+    let tile_at = header.len() as u64 + tables + 1_000_000;
+    let words = [
+        last as i32,
+        tiles.width as i32 - 1,
+        tiles.height as i32 - 1,
+        0,
+        0,
+        100,
+    ];
+    let head: Vec<u8> = words.iter().flat_map(|n| n.to_le_bytes()).collect();
+    let entry_at = header.len() as u64 + tables - 8;
+    let header_bytes = header.len();
+    let file = Arc::new(Ends {
+        pieces: vec![
+            (0, header),
+            (entry_at, tile_at.to_le_bytes().into()),
+            (tile_at, head),
+        ],
+        size_bytes: 1 << 40,
+        read: AtomicUsize::new(0),
+    });
+    TerrainFile::open("t", file.clone()).unwrap();
+    let read = file.read.load(Ordering::Relaxed);
+    assert!(read < header_bytes + 50_000, "{read} bytes were read");
+    assert!(tables > 300_000_000, "{tables} bytes of tables");
+}
+
+#[test]
+fn the_exr_crate_reads_every_part_as_written() {
+    use exr::prelude::{ReadChannels, ReadLayers, read};
+    for look in [Look::Noise, Look::Smooth] {
+        let arrays = Arrays::random(530, 300, true, look, 21);
+        let image = read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            .from_buffered(Cursor::new(arrays.file()))
+            .unwrap();
+        let layout = Layout::new(&arrays.grid, true).unwrap();
+        assert_eq!(image.layer_data.len(), layout.parts().len());
+        for (layer, part) in image.layer_data.iter().zip(layout.parts()) {
+            let level = part.level as usize;
+            for (index, channel) in layer.channel_data.list.iter().enumerate() {
+                assert_eq!(channel.name.to_string(), part.channels().0[index]);
+                let bits: Vec<u64> = channel
+                    .sample_data
+                    .values_as_f32()
+                    .map(|v| v.to_bits().into())
+                    .collect();
+                let want: Vec<u64> = match part.kind {
+                    layout::Kind::Height => {
+                        arrays.heights[level].iter().map(|h| h.to_bits().into()).collect()
+                    }
+                    layout::Kind::Bounds => {
+                        let field = tile::BOUNDS_FIELDS[index];
+                        let of = |b: &crate::levels::Bounds| bytemuck::cast::<_, [u32; 6]>(*b)[field].into();
+                        arrays.bounds[level].iter().map(of).collect()
+                    }
+                    layout::Kind::Light => {
+                        let all = &arrays.light.as_ref().unwrap()[level];
+                        let of = |l: &crate::levels::LightSample| [l.sky, l.sun][index].to_f32().to_bits();
+                        all.iter().map(|l| of(l).into()).collect()
+                    }
+                    layout::Kind::Check | layout::Kind::CheckBounds => continue,
+                };
+                assert!(bits == want, "{look:?}, {}", part.name());
+            }
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! The bytes of one tile: samples laid out as OpenEXR wants them, and their check.
 //!
 //! A decoded tile is row by row, in each row channel by channel. Samples are in the machine's own byte order,
-//! as the exr crate takes and gives them; files and checks are little-endian.
+//! as the exr crate has them; files and checks are little-endian.
 
 use bytemuck::{Pod, bytes_of, pod_read_unaligned};
 
@@ -17,11 +17,15 @@ pub(super) fn check(bytes: &[u8], sample_bytes: usize) -> u32 {
     if cfg!(target_endian = "little") {
         return crc32c::crc32c(bytes);
     }
-    let swapped: Vec<u8> = bytes
-        .chunks_exact(sample_bytes)
-        .flat_map(|s| s.iter().rev().copied())
-        .collect();
-    crc32c::crc32c(&swapped)
+    crc32c::crc32c(&little_endian(bytes.to_vec(), sample_bytes))
+}
+
+/// Samples between the machine's byte order and that of files, either way.
+pub(super) fn little_endian(mut bytes: Vec<u8>, sample_bytes: usize) -> Vec<u8> {
+    if cfg!(target_endian = "big") {
+        bytes.chunks_exact_mut(sample_bytes).for_each(<[u8]>::reverse);
+    }
+    bytes
 }
 
 /// Lays samples of `N` fields out as a tile `width` samples wide; channel c holds field `fields[c]`.

@@ -6,13 +6,13 @@ use std::sync::Mutex;
 
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedTileBlock, TileCoordinates};
 use exr::meta::MetaData;
-use exr::meta::attribute::IntegerBounds;
 use exr::prelude::Vec2;
 
 use super::header;
 use super::layout::{Kind, Layout, Part, TileRow};
 use super::meta::Meta;
-use super::tile::{BOUNDS_FIELDS, LIGHT_FIELDS, check, pack};
+use super::tile::{BOUNDS_FIELDS, LIGHT_FIELDS, check, little_endian, pack};
+use super::zip;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
 use crate::levels::{Arrival, Bounds, Levels, LightSample};
@@ -169,13 +169,7 @@ impl<W: Write + Seek> TerrainWriter<W> {
             )));
         }
         let check = check(&bytes, description.sample_bytes());
-        let header = &self.exr.headers[part];
-        // Where in the part the tile lies does not change its bytes.
-        let section = IntegerBounds::from_dimensions(Vec2(rect.width() as usize, rect.height() as usize));
-        let compressed = header
-            .compression
-            .compress_image_section_to_le(header, bytes, section)
-            .map_err(|e| wrong(&format!("cannot be compressed ({e})")))?;
+        let compressed = zip::compress(little_endian(bytes, description.sample_bytes()));
         Ok(EncodedTile {
             part,
             x,

@@ -11,6 +11,7 @@ use half::f16;
 #[cfg(feature = "gpu")]
 pub mod depths;
 pub mod facts;
+pub mod flights;
 pub mod motion;
 pub mod scenes;
 

@@ -130,6 +130,10 @@ pub(in crate::cli) struct ViewArgs {
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
     pub(in crate::cli) upload_budget: Option<u64>,
 
+    /// The most memory for tiles of a terrain file, those that are being loaded included; at least 32M [default: 256M]
+    #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
+    pub(in crate::cli) memory: Option<u64>,
+
     /// Factor on heights, within 1000000 of 0
     #[arg(long, short = 'z', value_name = "S", value_parser = values::number, default_value = "1")]
     #[arg(allow_negative_numbers = true)]

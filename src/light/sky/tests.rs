@@ -98,3 +98,14 @@ fn the_sky_on_and_in_a_cone() {
         );
     }
 }
+
+#[test]
+fn the_arc_cotangent_is_right() {
+    for step in 0..=4000 {
+        let x = 10f64.powf(f64::from(step) / 400.0 - 5.0);
+        for x in [x, 0.0] {
+            let (got, want) = (f64::from(arc_cotangent(x as f32)), 1f64.atan2(x));
+            assert!((got - want).abs() < 1e-6, "{x}: {got} against {want}");
+        }
+    }
+}
