@@ -4,6 +4,8 @@
 mod args;
 #[cfg(feature = "dem")]
 mod export;
+#[cfg(feature = "window")]
+mod fly;
 mod info;
 mod input;
 #[cfg(feature = "gpu")]
@@ -58,6 +60,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Preprocess(args) => preprocess::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "gpu")]
         Command::Render(args) => render::run(&args, &Terminal::new(args.quiet)),
+        #[cfg(feature = "window")]
+        Command::Fly(args) => fly::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "gpu")]
         Command::Measure(args) => measure::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "dem")]
