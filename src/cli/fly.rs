@@ -9,8 +9,9 @@ use super::view_values::ClipSize;
 use super::{Failure, Outcome, render, shots};
 use crate::clipmap::{ClipmapOptions, Wait};
 use crate::error::{Error, ErrorKind, Result};
+use crate::light::LightOptions;
 use crate::source;
-use crate::stream::Terrain;
+use crate::stream::{AtOnce, CacheFolder, Terrain};
 use crate::window::{self, WindowOptions};
 
 /// What is flown through where nothing is named.
@@ -54,9 +55,27 @@ pub(super) fn run(args: &FlyArgs, terminal: &Terminal) -> Outcome {
     };
     let read = args.read.options();
     let sun = args.view.sun;
+    let at_once = match args.view.wait {
+        Wait::All => None,
+        Wait::None => Some(AtOnce {
+            folder: if args.view.no_cache {
+                None
+            } else {
+                CacheFolder::of_user()?
+            },
+            light: LightOptions {
+                sun: sun.unwrap_or_default(),
+                ..Default::default()
+            },
+            tiles,
+        }),
+    };
     let open: window::Open = Box::new(move |progress| {
-        let terrain = Terrain::open_with(&inputs, &read, progress)?.with_tiles(&tiles)?;
-        if sun.is_some() && crate::levels::Levels::has_light(&terrain) {
+        let terrain = match &at_once {
+            Some(at_once) => Terrain::open_at_once(&inputs, &read, at_once, progress)?,
+            None => Terrain::open_with(&inputs, &read, progress)?.with_tiles(&tiles)?,
+        };
+        if sun.is_some_and(|sun| terrain.sun().is_some_and(|traced| traced != sun)) {
             progress.warn(&format!(
                 "{}: its light is traced already, so --sun changes nothing",
                 terrain.name()

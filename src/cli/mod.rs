@@ -2,6 +2,7 @@
 //! error, an error as one line: `clipscape: SUBJECT: what is wrong; what to do`.
 
 mod args;
+mod cache;
 #[cfg(feature = "dem")]
 mod export;
 #[cfg(feature = "window")]
@@ -64,6 +65,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Fly(args) => fly::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "gpu")]
         Command::Measure(args) => measure::run(&args, &Terminal::new(args.quiet)),
+        Command::Cache(args) => cache::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "dem")]
         Command::Export(args) => export::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "dem")]

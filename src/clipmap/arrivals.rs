@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::eye::Eye;
 use super::missing::distance;
-use super::plan::{HEIGHT_BYTES, LIGHT_BYTES, UpdatePlan};
+use super::plan::{HEIGHT_BYTES, LIGHT_BYTES, LevelPlan, UpdatePlan};
 use super::window::{Scratch, Window, is_damage};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
@@ -52,6 +52,9 @@ impl Faults {
         }
     }
 }
+
+/// Samples of windows that take the place of others, which are read in one frame, at least: a tile.
+const SUCCESSOR_SAMPLES: i64 = TILE * TILE;
 
 /// Where the eye is, and where it is going.
 #[derive(Clone, Copy, Debug)]
@@ -119,6 +122,7 @@ impl Arrivals {
         &mut self,
         levels: &dyn Levels,
         windows: &mut [Window],
+        successors: &mut [Option<Window>],
         plan: &mut UpdatePlan,
         scratch: &mut Scratch,
         course: &Course<'_>,
@@ -131,6 +135,17 @@ impl Arrivals {
         for written in plan.levels_mut() {
             let window = &mut windows[written.level as usize];
             let at = course.ahead.samples().map(|s| s / (1i64 << written.level) as f64);
+            window.missing.by_tile(TILE, at);
+            for rect in window.missing.waiting() {
+                window.wants(*rect, has_light, &mut self.wanted);
+            }
+        }
+        // Then what is to take the place of what is drawn.
+        for written in plan.levels_mut() {
+            let Some(window) = &mut successors[written.level as usize] else {
+                continue;
+            };
+            let at = course.eye.samples().map(|s| s / (1i64 << written.level) as f64);
             window.missing.by_tile(TILE, at);
             for rect in window.missing.waiting() {
                 window.wants(*rect, has_light, &mut self.wanted);
@@ -183,6 +198,58 @@ impl Arrivals {
                 rect.difference(part).for_each(|rest| window.missing.wait(rest));
                 Ok(Rect::EMPTY)
             })?;
+        }
+        Ok(())
+    }
+
+    /// Reads what is there of the windows that are to take others' places, coarse levels first, and lets one of which all
+    /// is there do so. It is uploaded whole, beyond any budget.
+    ///
+    /// # Errors
+    /// As [`Arrivals::some`].
+    pub(super) fn succeed(
+        &mut self,
+        levels: &dyn Levels,
+        windows: &mut [Window],
+        successors: &mut [Option<Window>],
+        plan: &mut UpdatePlan,
+        scratch: &mut Scratch,
+    ) -> Result<()> {
+        let faults = &mut self.faults;
+        let mut left = SUCCESSOR_SAMPLES;
+        for written in plan.levels_mut() {
+            let level = written.level as usize;
+            let Some(successor) = &mut successors[level] else {
+                continue;
+            };
+            let mut unseen = LevelPlan::new(written.level);
+            each(successor, |window, rect| {
+                if left <= 0 {
+                    return Ok(rect);
+                }
+                match window.fill(levels, rect, &mut unseen, scratch, Some(&mut *faults)) {
+                    Ok(Arrival::Arrived) => left -= rect.area(),
+                    Ok(Arrival::Missing) => return Ok(rect),
+                    // What cannot be read stays as it was drawn.
+                    Err(error) if is_damage(&error) => {
+                        window.missing.lose(rect);
+                        faults.push(error);
+                    }
+                    Err(error) => return Err(error),
+                }
+                Ok(Rect::EMPTY)
+            })?;
+            if successor.missing.is_empty() {
+                let window = &mut windows[level];
+                if let Some(successor) = successors[level].take() {
+                    *window = successor;
+                }
+                written.heights.clear();
+                written.light.clear();
+                written.heights.extend(window.pieces(window.resident()));
+                written.light.extend(window.light_pieces(window.light_resident()));
+                return Ok(());
+            }
         }
         Ok(())
     }

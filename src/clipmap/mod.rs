@@ -88,6 +88,8 @@ pub struct UpdateReport {
     pub pops: u64,
     /// Whether coarser levels were left out by [`ClipmapOptions::levels`], so that the picture ends at a border.
     pub cut: bool,
+    /// Whether some of what is resident stands in for data that are not there yet.
+    pub provisional: bool,
 }
 
 /// The clipmap of one view.
@@ -104,6 +106,9 @@ pub struct Clipmap {
     has_light: bool,
     range_m: [f32; 2],
     windows: Vec<Window>,
+    /// By level: the window that is to take a window's place, where the terrain has something better.
+    successors: Vec<Option<Window>>,
+    edition: u64,
     held: HeldField,
     wait: Wait,
     upload_budget_bytes: Option<u64>,
@@ -151,6 +156,8 @@ impl Clipmap {
             has_light: levels.has_light(),
             range_m: height_range_m(levels)?,
             windows: (0..count).map(|l| Window::new(l, &grid, &ring)).collect(),
+            successors: vec![None; count as usize],
+            edition: levels.edition(),
             held: HeldField::new(count, ring.held_size()),
             wait: options.wait,
             upload_budget_bytes: options.upload_budget_bytes,
@@ -216,12 +223,16 @@ impl Clipmap {
         let eye = Eye::new(view.eye, &self.grid);
         self.eye = None; // until all is done, there is no frame
         self.generation += 1;
+        self.meet_edition(levels);
         self.plan.begin(&self.windows, &eye);
         let mut exposed = 0;
         for plan in self.plan.levels() {
             let light_size = self.grid.level(light_level(plan.level));
             exposed += exposed_bytes(plan.level, plan.from, plan.to, light_size);
             self.windows[plan.level as usize].move_to(plan.to);
+            if let Some(successor) = &mut self.successors[plan.level as usize] {
+                successor.move_to(plan.to);
+            }
         }
         let fades = self.read_and_fade(levels, &eye, time_s)?;
         let ground = Ground {
@@ -281,6 +292,7 @@ impl Clipmap {
         let stale_levels = shown.clone().filter(|l| fades.held[*l]).count() as u32;
         let pops = shown.map(|l| fades.pops[l]).sum();
         let coarsest_there = self.windows[self.windows.len() - 1].missing().next().is_none();
+        let provisional = self.windows.iter().any(Window::is_provisional);
         self.report = UpdateReport {
             uploads: self.plan.uploads() as u64,
             upload_bytes: self.plan.bytes(),
@@ -289,12 +301,32 @@ impl Clipmap {
             patches_culled: self.selection.culled,
             triangles: self.selection.triangles(),
             levels_drawn: self.selection.levels.count_ones(),
-            complete: stale_levels == 0 && coarsest_there,
+            complete: stale_levels == 0 && coarsest_there && !provisional,
             stale_levels,
             pops,
             cut: self.cut,
+            provisional,
         };
         Ok(&self.report)
+    }
+
+    /// Where the terrain has something better than what was read so far, all of that is to be read anew.
+    fn meet_edition(&mut self, levels: &dyn Levels) {
+        let edition = levels.edition();
+        if edition == self.edition {
+            return;
+        }
+        self.edition = edition;
+        for (window, successor) in self.windows.iter_mut().zip(&mut self.successors) {
+            let fresh = Window::new(window.level(), &self.grid, &self.ring);
+            match self.wait {
+                Wait::All => *window = fresh,
+                Wait::None => *successor = Some(fresh),
+            }
+        }
+        if self.wait == Wait::All {
+            self.has_light = levels.has_light();
+        }
     }
 
     /// Reads what the windows miss, and holds back what has not arrived.
@@ -313,8 +345,17 @@ impl Clipmap {
             eye,
             ahead: eye.ahead(last_eye, passed_s, AHEAD_S),
         };
+        let successors = &mut self.successors;
         self.arrivals
-            .some(levels, windows, plan, scratch, &course, budget)?;
+            .some(levels, windows, successors, plan, scratch, &course, budget)?;
+        if successors.iter().any(Option::is_some) {
+            self.arrivals
+                .succeed(levels, windows, successors, plan, scratch)?;
+            if successors.iter().all(Option::is_none) {
+                self.has_light = levels.has_light();
+                self.range_m = range_of(&windows[windows.len() - 1]).unwrap_or(self.range_m);
+            }
+        }
         let moment = Moment {
             grid: &self.grid,
             eye,
@@ -445,6 +486,15 @@ impl Clipmap {
 /// That a clipmap has no frame to speak of.
 fn no_frame(what: &str) -> Error {
     Error::new(ErrorKind::Misuse, "clipmap", format!("there is no frame {what}")).advice("update it first")
+}
+
+/// The same of what a window knows, where that is anything.
+fn range_of(window: &Window) -> Option<[f32; 2]> {
+    let patches = window.known_patches();
+    let (low, high) = patches.fold((f32::NAN, f32::NAN), |(low, high), p| {
+        (low.min(p.bounds.need_min), high.max(p.bounds.need_max))
+    });
+    (low <= high).then_some([low, high])
 }
 
 /// The least and greatest height of a DEM in metres above its base, from the saturated bounds of its coarsest level, which

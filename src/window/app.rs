@@ -208,6 +208,7 @@ impl<'a> App<'a> {
                 Arc::new(terrain),
                 camera,
                 &self.settings,
+                self.options.sun,
                 self.options.sample_count,
                 graphics.size_px(),
             )?);
@@ -251,7 +252,10 @@ impl<'a> App<'a> {
         let mut wants = super::flying::Wants::default();
         let mut below_ground = false;
         if let Some(flying) = &mut self.flying {
-            let pointer = self.pointer.at.filter(|_| !self.pointer.captured && !overlay.has_pointer());
+            let pointer = self
+                .pointer
+                .at
+                .filter(|_| !self.pointer.captured && !overlay.has_pointer());
             wants = flying.frame(
                 &graphics.gpu,
                 &mut encoder,
@@ -280,7 +284,7 @@ impl<'a> App<'a> {
             title: &self.options.title,
             loading: self.loading.as_ref().map(Loading::stage),
             facts: flying.map_or(&facts, |f| &f.facts),
-            traced_sun: flying.and_then(|f| f.scene.terrain().sun()),
+            traced_sun: flying.and_then(|f| f.scene.traced_sun()),
             recording_s: flying.and_then(|f| f.recording_s(now_s)),
             notices: &notices,
             measuring: wants.measuring,
@@ -374,6 +378,7 @@ impl<'a> App<'a> {
     /// Says what is wrong with the data, each fault once, and of many only the first.
     fn take_faults(&mut self) {
         let Some(flying) = &mut self.flying else { return };
+        let warnings = flying.scene.terrain().take_warnings();
         let texts: Vec<String> = flying.scene.take_faults().iter().map(Error::to_string).collect();
         for text in texts {
             if !self.faults.contains(&text) {
@@ -382,6 +387,9 @@ impl<'a> App<'a> {
                 }
                 self.faults.push(text);
             }
+        }
+        for warning in warnings {
+            self.say(&warning);
         }
     }
 

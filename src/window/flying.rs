@@ -17,6 +17,7 @@ use crate::camera::{Camera, View, overview};
 use crate::clipmap::{Clipmap, Drawn, certify};
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::light::Sun;
 use crate::query::Surface;
 use crate::render::pictures::write_png;
 use crate::shade::ViewMode;
@@ -49,6 +50,7 @@ pub(super) struct Flying {
     errors_shown: bool,
     last_frame_s: Option<f64>,
     last_look_s: f64,
+    traced_sun: Sun,
     sample_count: u32,
 }
 
@@ -87,10 +89,11 @@ impl Flying {
         terrain: Arc<Terrain>,
         camera: Option<Camera>,
         settings: &Settings,
+        traced_sun: Sun,
         sample_count: u32,
         size_px: [u32; 2],
     ) -> Result<Self> {
-        let scene = Scene::new(gpu, terrain, settings, sample_count, size_px)?;
+        let scene = Scene::new(gpu, terrain, settings, traced_sun, sample_count, size_px)?;
         let camera = camera.unwrap_or_else(|| whole(&scene, settings, size_px));
         Ok(Self {
             scene,
@@ -101,6 +104,7 @@ impl Flying {
             errors_shown: false,
             last_frame_s: None,
             last_look_s: f64::NEG_INFINITY,
+            traced_sun,
             sample_count,
         })
     }
@@ -111,7 +115,14 @@ impl Flying {
     /// As for [`Scene::new`].
     pub(super) fn rebuild(&mut self, gpu: &Gpu, settings: &Settings, size_px: [u32; 2]) -> Result<()> {
         let terrain = self.scene.terrain().clone();
-        self.scene = Scene::new(gpu, terrain, settings, self.sample_count, size_px)?;
+        self.scene = Scene::new(
+            gpu,
+            terrain,
+            settings,
+            self.traced_sun,
+            self.sample_count,
+            size_px,
+        )?;
         self.measured = Measured::default();
         self.errors_shown = false;
         Ok(())
@@ -140,7 +151,7 @@ impl Flying {
         let mut lifts_left = LIFTS;
         let view = loop {
             let view = View::new(self.pilot.camera, moment.size_px)?;
-            uploaded += self.scene.update(encoder, &view, moment.now_s)?.upload_bytes;
+            uploaded += self.scene.update(gpu, encoder, &view, moment.now_s)?.upload_bytes;
             let lifted = on_ground(self.scene.clipmap(), scale, range_m, |ground| {
                 self.facts.above_m = ground.above_m(self.pilot.camera.eye);
                 lifts_left > 0 && self.pilot.keep_above(ground)
@@ -162,9 +173,13 @@ impl Flying {
         self.facts.cpu_ms = start.elapsed().as_secs_f64() * 1e3;
 
         let rests = self.pilot.rests(moment.held);
-        let settled = self.facts.update.complete && self.scene.is_idle();
+        // A draft is complete as far as it goes: what takes its place is looked for now and then.
+        let update = &self.facts.update;
+        let settled =
+            (update.complete || update.provisional && update.stale_levels == 0) && self.scene.is_idle();
         let mut wants = Wants {
             frame: !rests || !settled || self.recorder.is_some(),
+            look: update.provisional || self.scene.terrain().is_building(),
             ..Wants::default()
         };
         self.measure(

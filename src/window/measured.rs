@@ -3,13 +3,11 @@
 use std::sync::Arc;
 
 use super::loading::Loading;
-use super::scene;
 use super::settings::Settings;
 use crate::camera::View;
 use crate::clipmap::{ClipmapOptions, Wait};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::levels::Levels;
 use crate::render::{Headless, HeadlessOptions};
 use crate::shade::ViewMode;
 use crate::stream::Terrain;
@@ -92,8 +90,8 @@ fn measure(gpu: Gpu, terrain: Arc<Terrain>, subject: &Subject) -> Result<Vec<u8>
         view_mode: ViewMode::Error,
         tint: settings.tint,
         haze: settings.haze,
-        traced_light: terrain.has_light(),
-        sun: scene::sun(&terrain, settings),
+        traced_light: true,
+        sun: settings.sun,
         clipmap: ClipmapOptions {
             wait: Wait::All,
             upload_budget_bytes: None,

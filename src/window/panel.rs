@@ -90,18 +90,18 @@ fn panel(ctx: &Context, shown: &Shown, changed: &mut Changed) {
         .resizable(false)
         .show(ctx, |ui| {
             scrolled(ui, |ui| {
-            egui::Grid::new("figures").num_columns(2).show(ui, |ui| {
-                for (what, how_much) in text::lines(shown.facts) {
-                    ui.label(RichText::new(what).weak());
-                    ui.label(how_much);
-                    ui.end_row();
-                }
-            });
-            ui.separator();
-            views(ui, changed.settings);
-            dials(ui, shown, changed);
-            ui.separator();
-            ui.label(RichText::new("H: all keys   Tab: hide this   R: record   P: picture").weak());
+                egui::Grid::new("figures").num_columns(2).show(ui, |ui| {
+                    for (what, how_much) in text::lines(shown.facts) {
+                        ui.label(RichText::new(what).weak());
+                        ui.label(how_much);
+                        ui.end_row();
+                    }
+                });
+                ui.separator();
+                views(ui, changed.settings);
+                dials(ui, shown, changed);
+                ui.separator();
+                ui.label(RichText::new("H: all keys   Tab: hide this   R: record   P: picture").weak());
             });
         });
 }
@@ -213,25 +213,26 @@ fn help(ctx: &Context) {
         .resizable(false)
         .show(ctx, |ui| {
             scrolled(ui, |ui| {
-            let half = BINDINGS.len().div_ceil(2);
-            ui.horizontal_top(|ui| {
-                for (k, bindings) in BINDINGS.chunks(half).enumerate() {
-                    egui::Grid::new(("keys", k))
-                        .num_columns(2)
-                        .striped(true)
-                        .show(ui, |ui| {
-                            for binding in bindings {
-                                ui.label(RichText::new(binding.keys).strong());
-                                ui.label(binding.words);
-                                ui.end_row();
-                            }
-                        });
-                }
+                let half = BINDINGS.len().div_ceil(2);
+                ui.horizontal_top(|ui| {
+                    for (k, bindings) in BINDINGS.chunks(half).enumerate() {
+                        egui::Grid::new(("keys", k))
+                            .num_columns(2)
+                            .striped(true)
+                            .show(ui, |ui| {
+                                for binding in bindings {
+                                    ui.label(RichText::new(binding.keys).strong());
+                                    ui.label(binding.words);
+                                    ui.end_row();
+                                }
+                            });
+                    }
+                });
+                ui.separator();
+                ui.label(
+                    "Drag with a mouse button held to look. Keys are named by their place on a US keyboard.",
+                );
             });
-            ui.separator();
-            ui.label(
-                "Drag with a mouse button held to look. Keys are named by their place on a US keyboard.",
-            );
         });
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::settings::Settings;
 use crate::camera::View;
-use crate::clipmap::{Clipmap, UpdateReport, Wait, height_range_m};
+use crate::clipmap::{Clipmap, UpdateReport, Wait};
 use crate::error::{Error, Result};
 use crate::gpu::{ClipmapRenderer, DrawReport, Gpu, RendererOptions, SkyRenderer, ViewTextures};
 use crate::levels::Levels;
@@ -39,8 +39,9 @@ impl Look {
 pub(super) struct Scene {
     terrain: Arc<Terrain>,
     arriving: Arriving,
-    range_m: [f64; 2],
     settings: Settings,
+    /// The sun that light is traced with where the terrain does not say: that of the beginning.
+    traced_sun: Sun,
     sample_count: u32,
     clipmap: Clipmap,
     /// Pipelines by what they show; the first is the one in use.
@@ -51,7 +52,8 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// Prepares to draw `terrain` in pictures of `size_px` pixels.
+    /// Prepares to draw `terrain` in pictures of `size_px` pixels. `traced_sun` is the sun of the light that is traced
+    /// while it is shown, where it is.
     ///
     /// # Errors
     /// For settings out of range; those of reading the terrain and of the device.
@@ -59,16 +61,16 @@ impl Scene {
         gpu: &Gpu,
         terrain: Arc<Terrain>,
         settings: &Settings,
+        traced_sun: Sun,
         sample_count: u32,
         size_px: [u32; 2],
     ) -> Result<Self> {
         let arriving = terrain.arriving();
         let clipmap = Clipmap::new(levels(&terrain, &arriving, settings), &settings.clipmap)?;
-        let base_m = terrain.grid().base_m;
-        let range_m = height_range_m(terrain.as_ref())?.map(|h| f64::from(h) + base_m);
         let options = options(settings, sample_count, clipmap.has_light());
         let renderer = ClipmapRenderer::new(&gpu.device, &options)?;
-        let textures = renderer.textures(&gpu.device, &clipmap, sun(&terrain, settings))?;
+        let sun = sun(&terrain, clipmap.has_light(), traced_sun, settings);
+        let textures = renderer.textures(&gpu.device, &clipmap, sun)?;
         Ok(Self {
             sky: SkyRenderer::new(&gpu.device, &options)?,
             targets: Targets::new(gpu, size_px, sample_count, &options),
@@ -76,8 +78,8 @@ impl Scene {
             textures,
             clipmap,
             settings: *settings,
+            traced_sun,
             sample_count,
-            range_m,
             arriving,
             terrain,
         })
@@ -105,7 +107,7 @@ impl Scene {
         if !self.clipmap.adopt(&settings.clipmap)? {
             self.clipmap = Clipmap::new(levels(&self.terrain, &self.arriving, settings), &settings.clipmap)?;
         }
-        let sun = sun(&self.terrain, settings);
+        let sun = self.sun_of(settings);
         if (self.clipmap.ring().clip_size, self.clipmap.windows().len()) == before {
             self.textures.set_sun(sun);
         } else {
@@ -129,15 +131,40 @@ impl Scene {
     /// For a view of other than finite numbers; those of reading the terrain and of the device.
     pub(super) fn update(
         &mut self,
+        gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         view: &View,
         time_s: f64,
     ) -> Result<UpdateReport> {
         let levels = levels(&self.terrain, &self.arriving, &self.settings);
         let report = *self.clipmap.update(levels, view, time_s)?;
+        self.follow_light(gpu)?;
         let renderer = &self.renderers[0].1;
         renderer.upload(encoder, &self.clipmap, &mut self.textures)?;
         Ok(report)
+    }
+
+    /// Where light has come that was traced meanwhile, other pipelines draw it.
+    fn follow_light(&mut self, gpu: &Gpu) -> Result<()> {
+        let has_light = self.clipmap.has_light();
+        if has_light == self.renderers[0].1.options().traced_light {
+            return Ok(());
+        }
+        let options = options(&self.settings, self.sample_count, has_light);
+        let renderer = ClipmapRenderer::new(&gpu.device, &options)?;
+        let sun = self.sun_of(&self.settings);
+        self.textures = renderer.textures(&gpu.device, &self.clipmap, sun)?;
+        self.renderers = vec![(Look::of(&self.settings), renderer)];
+        Ok(())
+    }
+
+    fn sun_of(&self, settings: &Settings) -> Sun {
+        sun(&self.terrain, self.clipmap.has_light(), self.traced_sun, settings)
+    }
+
+    /// The sun of the traced light, where there is such.
+    pub(super) fn traced_sun(&self) -> Option<Sun> {
+        self.clipmap.has_light().then(|| self.sun_of(&self.settings))
     }
 
     /// Records the drawing of the last update.
@@ -207,7 +234,8 @@ impl Scene {
 
     /// Least and greatest height of the DEM in metres.
     pub(super) fn range_m(&self) -> [f64; 2] {
-        self.range_m
+        let base_m = self.clipmap.grid().base_m;
+        self.clipmap.height_range_m().map(|h| f64::from(h) + base_m)
     }
 
     /// Whether nothing is on its way from the terrain.
@@ -232,8 +260,12 @@ fn levels<'a>(terrain: &'a Arc<Terrain>, arriving: &'a Arriving, settings: &Sett
 }
 
 /// The sun of the traced light, or the one that is set.
-pub(super) fn sun(terrain: &Terrain, settings: &Settings) -> Sun {
-    terrain.sun().unwrap_or(settings.sun)
+fn sun(terrain: &Terrain, has_light: bool, traced_sun: Sun, settings: &Settings) -> Sun {
+    if has_light {
+        terrain.sun().unwrap_or(traced_sun)
+    } else {
+        settings.sun
+    }
 }
 
 fn options(settings: &Settings, sample_count: u32, traced_light: bool) -> RendererOptions {
@@ -345,7 +377,7 @@ mod tests {
 
     fn draw(scene: &mut Scene, gpu: &Gpu, view: &View) -> Vec<u8> {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        scene.update(&mut encoder, view, 0.0).unwrap();
+        scene.update(gpu, &mut encoder, view, 0.0).unwrap();
         scene.record(&mut encoder).unwrap();
         gpu.queue.submit([encoder.finish()]);
         scene.pixels(gpu).unwrap().1
@@ -370,7 +402,7 @@ mod tests {
     fn after_any_change_of_settings_the_picture_is_that_of_a_frame_made_for_them() {
         let Some(gpu) = gpu() else { return };
         let terrain = Arc::new(Terrain::from_synth(Synth::new(1024, 3).unwrap()));
-        let mut scene = Scene::new(&gpu, terrain.clone(), &settings(), 1, SIZE_PX).unwrap();
+        let mut scene = Scene::new(&gpu, terrain.clone(), &settings(), Sun::default(), 1, SIZE_PX).unwrap();
         let camera = Camera {
             eye: DVec3::new(15_000.0, 2500.0, 25_000.0),
             heading_deg: 10.0,
@@ -416,11 +448,11 @@ mod tests {
         let terrain = Arc::new(Terrain::from_synth(Synth::new(512, 3).unwrap()));
         let camera = overview(terrain.grid(), 0.0, 3000.0, 16.0 / 9.0);
         let view = View::new(camera, SIZE_PX).unwrap();
-        let mut scene = Scene::new(&gpu, terrain.clone(), &settings(), 4, SIZE_PX).unwrap();
+        let mut scene = Scene::new(&gpu, terrain.clone(), &settings(), Sun::default(), 4, SIZE_PX).unwrap();
         let before = draw(&mut scene, &gpu, &view);
         drop(scene);
         gpu.device.destroy();
-        let mut scene = Scene::new(&other, terrain, &settings(), 4, SIZE_PX).unwrap();
+        let mut scene = Scene::new(&other, terrain, &settings(), Sun::default(), 4, SIZE_PX).unwrap();
         assert!(draw(&mut scene, &other, &view) == before);
     }
 }

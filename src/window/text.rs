@@ -106,6 +106,7 @@ pub(super) fn lines(facts: &Facts) -> Vec<(&'static str, String)> {
 pub(super) fn state(update: &UpdateReport) -> String {
     let mut text = match (update.complete, update.stale_levels) {
         (true, _) => "complete".to_string(),
+        (false, 0) if update.provisional => "a draft, while the terrain file is built".to_string(),
         (false, 0) => "the coarsest level is not complete".to_string(),
         (false, 1) => "1 level behind".to_string(),
         (false, n) => format!("{n} levels behind"),
@@ -365,6 +366,8 @@ mod tests {
             level: 2,
         });
         facts.update.complete = false;
+        facts.update.provisional = true;
+        assert!(text(&facts).contains("Data: a draft, while the terrain file is built\n"));
         facts.update.stale_levels = 3;
         facts.certificate = Some(Certificate {
             error_px: Ok(0.456),

@@ -13,7 +13,8 @@ use crate::light::Sun;
 use crate::shade::ViewMode;
 
 /// Draw pictures of a DEM or terrain file: one that shows the whole, one from a given place, or a flight. Of a DEM the
-/// pyramid is built on the way, and no light traced.
+/// pyramid is built on the way, and no light traced; with --wait none it is drawn at once, and its terrain file built
+/// meanwhile and kept for the next run.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct RenderArgs {
     #[command(flatten)]
@@ -47,7 +48,8 @@ pub(in crate::cli) struct RenderArgs {
 
     /// Measure every drawn frame against the DEM's own surface, and say in --stats how far off it is on the screen and in
     /// metres (error_*), how many pixels see through the drawn surface (cracks), and at how many the two disagree about
-    /// being terrain (silhouette_px); takes a while, and needs --stats
+    /// being terrain (silhouette_px); a pixel whose depth is that of a triangle beside it is measured on that triangle
+    /// (beside_px). Takes a while, and needs --stats
     #[arg(long, requires = "stats")]
     pub(in crate::cli) measure: bool,
 
@@ -140,6 +142,10 @@ pub(in crate::cli) struct ViewArgs {
     /// The most memory for tiles of a terrain file, those that are being loaded included; at least 32M [default: 256M]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes, allow_negative_numbers = true)]
     pub(in crate::cli) memory: Option<u64>,
+
+    /// Keep no terrain file of what is built in the background while frames of a DEM are drawn with --wait none
+    #[arg(long)]
+    pub(in crate::cli) no_cache: bool,
 
     /// Factor on heights, within 1000000 of 0
     #[arg(long, short = 'z', value_name = "S", value_parser = values::number, default_value = "1")]
