@@ -21,47 +21,22 @@
 //!   lies behind the surface on all the rays: then one sheet of ground covers them all;
 //! - by what lies before that sheet: a triangle seen almost edge on may hide behind the nearer ones on every ray, and
 //!   still be drawn where the grid bares it, at a depth that its plane takes a little beside it. So what was drawn must
-//!   lie behind all that the rays meet before the sheet, one hit after another. Such a triangle may be narrower than
-//!   any ring: it is looked for by halving the way between two rays that hit different triangles.
+//!   lie behind all that the rays meet before the sheet, one hit after another, see `beside.rs`.
 
+use super::beside::{RINGS_PX, edges, find_hit, five, ring};
 use super::{DepthImage, Facet};
-use crate::clipmap::{Drawn, Eye, near_of_m};
-use crate::error::{Error, ErrorKind, Result};
+use crate::clipmap::{Drawn, near_of_m};
+use crate::error::Result;
 use crate::query::{Crossing, Picker};
 use crate::work::{Work, each_chunk};
-
-/// Pixels from a pixel's centre to the rays beside it.
-const BESIDE_PX: f64 = 1.0 / 128.0;
-
-/// The five rays of a pixel, from its centre in units of [`BESIDE_PX`].
-const FIVE: [[f64; 2]; 5] = [[0.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]];
-
-/// Pixels from a pixel's centre to the rings of the second look.
-const RINGS_PX: [f64; 2] = [1.0 / 512.0, 1.0 / 256.0];
-
-/// Halvings of the way between two rays: from 1/256 pixel to the 2^-32nd of one.
-const HALVINGS: usize = 24;
-
-/// The share of a distance by which a ray goes on from one hit to look for the next: more than its rounding, less
-/// than what lies between two triangles at the end of the halvings.
-const STEP: f64 = 1e-12;
-
-/// The most hits of a ray that are looked at: rounding may find one twice.
-const MOST_HITS: usize = 64;
 
 /// The pixels of `image`, column and row, that are cracks in `drawn`, row by row.
 ///
 /// # Errors
-/// [`ErrorKind::Misuse`] where the surface is drawn for another eye than the image's.
+/// [`crate::ErrorKind::Misuse`] where the surface is drawn for another eye than the image's.
 pub fn cracks(drawn: &Drawn<'_>, image: &DepthImage<'_>, work: &dyn Work) -> Result<Vec<[u32; 2]>> {
+    image.check_eye_of(drawn)?;
     let view = image.view();
-    if Eye::new(view.eye, drawn.grid()) != *drawn.eye() {
-        return Err(Error::new(
-            ErrorKind::Misuse,
-            "depth image",
-            "is of another eye than the drawn surface",
-        ));
-    }
     let mut rows: Vec<Result<Vec<[u32; 2]>>> = (0..view.size_px[1]).map(|_| Ok(Vec::new())).collect();
     each_chunk(work, &mut rows, 1, |y, row| {
         row[0] = cracks_in_row(drawn, image, y as u32);
@@ -98,7 +73,7 @@ struct Pixel<'a, 'p> {
 
 impl Pixel<'_, '_> {
     fn is_crack(&mut self) -> Result<bool> {
-        let five = FIVE.map(|[east, south]| self.beside(east * BESIDE_PX, south * BESIDE_PX));
+        let five = five(self.centre);
         let mut moved_px = 0.0f64;
         for ray in five {
             let hit = self.picker.cast(ray)?;
@@ -107,75 +82,23 @@ impl Pixel<'_, '_> {
                 Some(facet) => moved_px = moved_px.max(facet.place_rounding_px),
             }
         }
-        let ring = |radius: f64| {
-            (0..8).map(move |k| {
-                let turn = f64::from(k) * std::f64::consts::FRAC_PI_4;
-                [radius * turn.cos(), radius * turn.sin()]
-            })
-        };
         let [inner, outer] = RINGS_PX;
         let farthest = outer.max(moved_px * std::f64::consts::SQRT_2);
-        let rings = [inner, outer, farthest].into_iter().flat_map(ring);
-        let mut rays: Vec<_> = rings.map(|[east, south]| self.beside(east, south)).collect();
+        let rings = [inner, outer, farthest];
+        let mut rays: Vec<_> = rings.into_iter().flat_map(|r| ring(self.centre, r)).collect();
         rays.extend(five);
         match self.sheet_m(&rays)? {
             None => Ok(false),
             Some(sheet_m) => {
-                let edges = self.edges(&rays)?;
+                let edges = edges(self.picker, self.centre, &rays)?;
                 Ok(self.all_lie_before(&rays, sheet_m)? && self.all_lie_before(&edges, sheet_m)?)
             }
         }
     }
 
-    /// Rays on both sides of, and as near as f64 allows to, the edges of the triangles that the centre and others hit.
-    fn edges(&mut self, rays: &[[f64; 2]]) -> Result<Vec<[f64; 2]>> {
-        let mut edges = Vec::new();
-        let hit_at = |picker: &mut Picker<'_, _>, ray| -> Result<_> {
-            Ok(picker.cast(ray)?.map(|hit| (hit.level, hit.cell, hit.triangle)))
-        };
-        let at_centre = hit_at(self.picker, self.centre)?;
-        for &ray in rays {
-            let at_ray = hit_at(self.picker, ray)?;
-            if at_ray == at_centre {
-                continue;
-            }
-            for (from, at_from, to) in [(self.centre, at_centre, ray), (ray, at_ray, self.centre)] {
-                let (mut inside, mut outside) = (from, to);
-                for _ in 0..HALVINGS {
-                    let middle = [0, 1].map(|k| (inside[k] + outside[k]) / 2.0);
-                    if hit_at(self.picker, middle)? == at_from {
-                        inside = middle;
-                    } else {
-                        outside = middle;
-                    }
-                }
-                edges.extend([inside, outside]);
-            }
-        }
-        Ok(edges)
-    }
-
-    fn beside(&self, east: f64, south: f64) -> [f64; 2] {
-        [self.centre[0] + east, self.centre[1] + south]
-    }
-
     /// The triangle that was hit, if it lies before what was drawn.
     fn before(&self, hit: &Crossing) -> Option<Facet> {
-        let (grid, view) = (self.drawn.grid(), self.image.view());
-        let hit_depth = near_of_m(view, grid) / hit.along;
-        if self.depth >= hit_depth {
-            return None;
-        }
-        // Seen exactly edge on, a triangle has any depth.
-        let facet = Facet::new(
-            grid,
-            view,
-            self.drawn.clipmap().vertical_scale(),
-            hit,
-            self.centre,
-        )?;
-        let drawable = hit.along - facet.vertex_rounding_m > near_of_m(view, grid);
-        (drawable && self.depth < facet.depth.min(hit_depth) - facet.rounding()).then_some(facet)
+        before(self.drawn, self.image, self.depth, self.centre, hit)
     }
 
     /// Where the surface begins to be before all rays at once, nearer than what was drawn; none where it never is.
@@ -195,19 +118,38 @@ impl Pixel<'_, '_> {
 
     /// Whether all that the rays hit up to a distance lies before what was drawn.
     fn all_lie_before(&mut self, rays: &[[f64; 2]], end_m: f64) -> Result<bool> {
+        let near_m = near_of_m(self.image.view(), self.drawn.grid());
         for &ray in rays {
-            let mut start_m = near_of_m(self.image.view(), self.drawn.grid());
-            for _ in 0..MOST_HITS {
-                let hit = self.picker.cast_from(ray, start_m)?;
-                let Some(hit) = hit.filter(|hit| hit.along <= end_m) else {
-                    break;
-                };
-                if self.before(&hit).is_none() {
-                    return Ok(false);
-                }
-                start_m = hit.along * (1.0 + STEP);
+            // The first hit that does not lie before what was drawn, or that is beyond the end: whether it is the former.
+            let (drawn, image, depth, centre) = (self.drawn, self.image, self.depth, self.centre);
+            let before = |hit: &Crossing| before(drawn, image, depth, centre, hit).is_some();
+            let found = find_hit(self.picker, ray, near_m, |hit| match hit.along <= end_m {
+                true if before(hit) => None,
+                within => Some(within),
+            })?;
+            if found == Some(true) {
+                return Ok(false);
             }
         }
         Ok(true)
     }
+}
+
+/// The triangle that was hit, if it lies before what was drawn at a pixel.
+fn before(
+    drawn: &Drawn<'_>,
+    image: &DepthImage<'_>,
+    depth: f64,
+    centre: [f64; 2],
+    hit: &Crossing,
+) -> Option<Facet> {
+    let (grid, view) = (drawn.grid(), image.view());
+    let hit_depth = near_of_m(view, grid) / hit.along;
+    if depth >= hit_depth {
+        return None;
+    }
+    // Seen exactly edge on, a triangle has any depth.
+    let facet = Facet::new(grid, view, drawn.clipmap().vertical_scale(), hit, centre)?;
+    let drawable = hit.along - facet.vertex_rounding_m > near_of_m(view, grid);
+    (drawable && depth < facet.depth.min(hit_depth) - facet.rounding()).then_some(facet)
 }

@@ -24,8 +24,10 @@
 use glam::DVec3;
 
 use super::exact::each_row;
+use super::second_look::SecondLook;
 use super::{DepthImage, Facet, RASTER_PX};
 use crate::camera::View;
+use crate::clipmap::Drawn;
 use crate::error::Result;
 use crate::query::{Crossing, Probe, Truth};
 use crate::work::Work;
@@ -42,6 +44,9 @@ pub struct PixelError {
     pub error_m: f32,
     /// Whether drawn and exact image disagree about being terrain.
     pub silhouette: bool,
+    /// Whether the depth is that of a triangle beside the pixel's centre, and the error that of the point which a ray meets
+    /// on it, see [`measure_drawn`].
+    pub beside: bool,
 }
 
 /// The measured errors of a frame.
@@ -70,6 +75,8 @@ pub struct ErrorSummary {
     pub error_floor_px: f64,
     /// Pixels at which the exact image and the drawn one disagree about being terrain.
     pub silhouette_px: u64,
+    /// Pixels whose depth is that of a triangle beside them, measured on it, see [`measure_drawn`].
+    pub beside_px: u64,
 }
 
 /// Measures a drawn frame against `truth`.
@@ -77,6 +84,51 @@ pub struct ErrorSummary {
 /// # Errors
 /// [`crate::ErrorKind::Misuse`] for a view of other than finite numbers; those of reading.
 pub fn measure(truth: &Truth<'_>, image: &DepthImage<'_>, work: &dyn Work) -> Result<FrameErrors> {
+    measure_by(
+        truth,
+        image,
+        work,
+        || (),
+        |probe, (), pixel, depth| at_pixel(truth, probe, image.view(), pixel, depth),
+    )
+}
+
+/// The same for a frame of which it is known what surface it draws: where a pixel's depth is not on that surface, but is the
+/// depth of a triangle that rays beside its centre meet, the point that such a ray meets is measured in its place
+/// (`second_look.rs`).
+///
+/// # Errors
+/// As [`measure`], and [`crate::ErrorKind::Misuse`] where the surface is drawn for another eye than the image's.
+pub fn measure_drawn(
+    truth: &Truth<'_>,
+    drawn: &Drawn<'_>,
+    image: &DepthImage<'_>,
+    work: &dyn Work,
+) -> Result<FrameErrors> {
+    image.check_eye_of(drawn)?;
+    measure_by(
+        truth,
+        image,
+        work,
+        || SecondLook::new(drawn, image),
+        |probe, second_look, pixel, depth| {
+            let first = at_pixel(truth, probe, image.view(), pixel, depth)?;
+            if first.error_px > 0.0 {
+                second_look.at_pixel(probe, pixel, depth, first)
+            } else {
+                Ok(first)
+            }
+        },
+    )
+}
+
+fn measure_by<M>(
+    truth: &Truth<'_>,
+    image: &DepthImage<'_>,
+    work: &dyn Work,
+    memory: impl Fn() -> M + Sync,
+    at_pixel: impl Fn(&mut Probe<'_>, &mut M, [f64; 2], f64) -> Result<PixelError> + Sync,
+) -> Result<FrameErrors> {
     let view = image.view();
     let mut pixels = vec![PixelError::default(); view.size_px.iter().map(|&n| n as usize).product()];
     each_row(
@@ -84,10 +136,10 @@ pub fn measure(truth: &Truth<'_>, image: &DepthImage<'_>, work: &dyn Work) -> Re
         view,
         work,
         &mut pixels,
-        || (),
-        |probe, (), pixel, out| {
+        memory,
+        |probe, memory, pixel, out| {
             let depth = image.row(pixel[1] as u32)[pixel[0] as usize];
-            *out = at_pixel(truth, probe, view, pixel, f64::from(depth))?;
+            *out = at_pixel(probe, memory, pixel, f64::from(depth))?;
             Ok(())
         },
     )?;
@@ -108,6 +160,7 @@ fn at_pixel(
         floor_px: 0.0,
         error_m: f32::NAN,
         silhouette: is_terrain,
+        beside: false,
     };
     let away_m = probe.near_m() / depth;
     // Also where the depth is no number.
@@ -149,11 +202,12 @@ fn at_pixel(
         floor_px: to_f32(floor_px),
         error_m: to_f32(if scale == 0.0 { 0.0 } else { (gap_m / scale).abs() }),
         silhouette: !is_terrain,
+        beside: false,
     })
 }
 
 /// Within f32, as large as need be: JSON knows no infinity.
-fn to_f32(value: f64) -> f32 {
+pub(super) fn to_f32(value: f64) -> f32 {
     value.min(f64::from(f32::MAX)) as f32
 }
 
@@ -197,7 +251,7 @@ impl Rounding {
 }
 
 /// Vertical distances on the screen, from a point on the ray through a pixel.
-struct Screen {
+pub(super) struct Screen {
     /// Pixels, times the distance along the view axis, of a metre up.
     per_m: f64,
     away_m: f64,
@@ -206,7 +260,7 @@ struct Screen {
 }
 
 impl Screen {
-    fn new(view: &View, pixel: [f64; 2], away_m: f64) -> Self {
+    pub(super) fn new(view: &View, pixel: [f64; 2], away_m: f64) -> Self {
         let [x, y, w] = view.clip_rows();
         let size = view.size_px.map(f64::from);
         let place = [2.0 * pixel[0] / size[0] - 1.0, 1.0 - 2.0 * pixel[1] / size[1]];
@@ -220,7 +274,7 @@ impl Screen {
     }
 
     /// Pixels to the point `gap_m` metres below.
-    fn px(&self, gap_m: f64) -> f64 {
+    pub(super) fn px(&self, gap_m: f64) -> f64 {
         let away_m = self.away_m - gap_m * self.forward;
         if gap_m == 0.0 {
             0.0
@@ -248,6 +302,7 @@ impl ErrorSummary {
         let mut summary = Self {
             terrain_px: errors.len() as u64,
             silhouette_px: pixels.iter().filter(|p| p.silhouette).count() as u64,
+            beside_px: pixels.iter().filter(|p| p.beside).count() as u64,
             ..Self::default()
         };
         if errors.is_empty() {

@@ -2,26 +2,30 @@
 //!
 //! A [`DepthImage`] is what the device left. [`cracks()`] counts the pixels that see through the drawn surface; what f32
 //! and the rasteriser's grid may do to a depth is stated, and derived, by [`Facet`]. [`measure`] compares each drawn point
-//! with `S0`, pixel by pixel, and an [`ErrorPool`] takes frames together. [`ExactImage`] is what should have been
+//! with `S0`, pixel by pixel ([`measure_drawn`] knows the surface that was drawn, and looks twice where a pixel misses it), and
+//! an [`ErrorPool`] takes frames together. [`ExactImage`] is what should have been
 //! drawn, and [`Shading`] its picture.
 
+mod beside;
 mod cracks;
 mod exact;
 mod facet;
 mod foreign;
 mod measured;
 mod pool;
+mod second_look;
 mod shaded;
 
 pub use cracks::cracks;
 pub use exact::ExactImage;
 pub use facet::{Facet, INTERPOLATION, RASTER_PX, ROUNDING};
 pub use foreign::{Distances, parse_camera};
-pub use measured::{ErrorSummary, FrameErrors, PixelError, measure};
+pub use measured::{ErrorSummary, FrameErrors, PixelError, measure, measure_drawn};
 pub use pool::{ErrorPool, RESOLUTION};
 pub use shaded::{Look, Shading, psnr_db};
 
 use crate::camera::View;
+use crate::clipmap::{Drawn, Eye};
 use crate::error::{Error, ErrorKind, Result};
 
 /// The depths of a picture: one a pixel, row by row from the upper left, near distance over distance along the view
@@ -58,6 +62,15 @@ impl<'a> DepthImage<'a> {
     /// The view.
     pub fn view(&self) -> &View {
         &self.view
+    }
+
+    /// Refuses a surface that is drawn for another eye.
+    fn check_eye_of(&self, drawn: &Drawn<'_>) -> Result<()> {
+        if Eye::new(self.view.eye, drawn.grid()) == *drawn.eye() {
+            return Ok(());
+        }
+        let what = "is of another eye than the drawn surface";
+        Err(Error::new(ErrorKind::Misuse, "depth image", what))
     }
 
     /// A row of depths.

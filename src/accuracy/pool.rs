@@ -52,6 +52,7 @@ impl ErrorPool {
         all.error_floor_px = all.error_floor_px.max(new.error_floor_px);
         all.terrain_px += new.terrain_px;
         all.silhouette_px += new.silhouette_px;
+        all.beside_px += new.beside_px;
         self.squares += new.error_px_rms * new.error_px_rms * new.terrain_px as f64;
         self.frames += 1;
         for error in errors.pixels.iter().map(|p| p.error_px).filter(|e| !e.is_nan()) {
@@ -110,6 +111,7 @@ mod tests {
             floor_px: error_px / 2.0,
             error_m: error_px * 3.0,
             silhouette: error_px.is_nan(),
+            beside: error_px > 1.0,
         };
         let pixels: Vec<_> = errors.iter().map(pixel).collect();
         let summary = ErrorSummary::of(&pixels);
@@ -136,8 +138,8 @@ mod tests {
             let pooled = pool.summary();
             assert_eq!(pooled.error_px_max, whole.error_px_max);
             assert_eq!(
-                (pooled.terrain_px, pooled.silhouette_px),
-                (whole.terrain_px, whole.silhouette_px)
+                (pooled.terrain_px, pooled.silhouette_px, pooled.beside_px),
+                (whole.terrain_px, whole.silhouette_px, whole.beside_px)
             );
             assert_eq!(
                 (pooled.error_m_max, pooled.error_floor_px),

@@ -11,7 +11,7 @@ use super::tiles::{Tiles, put_tiles};
 use crate::error::Result;
 use crate::grid::Rect;
 use crate::levels::{Arrival, Levels};
-use crate::light::{LightOptions, light_levels, sky_share, sun_share};
+use crate::light::{Earth, LightOptions, light_levels, sky_share_on, sun_share_on};
 use crate::progress::Progress;
 use crate::pyramid::Filter;
 use crate::terrain::layout::{Kind, TILE};
@@ -29,7 +29,7 @@ pub(super) struct Took {
     pub(super) write_s: f64,
 }
 
-/// Traces the light of `heights` as `options` say, filters it into all levels and puts them.
+/// Traces the light of `heights` on `earth` as `options` say, filters it into all levels and puts them.
 ///
 /// # Errors
 /// Those of tracing and of the file; [`crate::ErrorKind::Cancelled`].
@@ -37,6 +37,7 @@ pub(super) fn write_light<W: Write + Seek + Sync + Send>(
     heights: &TerrainFile,
     writer: &mut TerrainWriter<W>,
     options: &LightOptions,
+    earth: &Earth,
     filter: &Filter,
     work: &dyn Work,
     progress: &dyn Progress,
@@ -45,11 +46,11 @@ pub(super) fn write_light<W: Write + Seek + Sync + Send>(
     let start = Instant::now();
     let grid = *heights.grid();
     let level_0 = read_level_0(heights)?;
-    let sun = sun_share(&level_0, &grid, options.sun, work, progress)?;
+    let sun = sun_share_on(&level_0, &grid, earth, options.sun, work, progress)?;
     took.sun_s = start.elapsed().as_secs_f64();
 
     let start = Instant::now();
-    let sky = sky_share(&level_0, &grid, options.sky_directions, work, progress)?;
+    let sky = sky_share_on(&level_0, &grid, earth, options.sky_directions, work, progress)?;
     let levels = light_levels(&grid, &level_0, sun, sky, filter, work, progress)?;
     took.sky_s = start.elapsed().as_secs_f64();
 

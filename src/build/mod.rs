@@ -5,6 +5,7 @@
 //! them back and writes the bounds; `light` traces sun and sky over them by [`crate::light`]. What is held depends on the
 //! DEM's width alone, except for light: it is computed beforehand, and more than the ceiling is refused.
 //! [`build_pyramid`] holds all levels in memory instead, for who draws a DEM without a file.
+//! [`relight`] gives a terrain file other light.
 //! [`Part`] is a level's heights, light or error as a DEM of its own, to be written as one.
 //! [`Threads`] shares the work out; results do not depend on their number.
 
@@ -16,6 +17,7 @@ mod memory;
 mod output;
 mod part;
 mod preprocess;
+mod relight;
 #[cfg(test)]
 mod tests;
 mod threads;
@@ -26,4 +28,5 @@ pub use memory::{DEFAULT_MEMORY_BYTES, HELD_MEMORY_BYTES, needed_bytes, peak_rss
 pub use output::{Output, refuse_existing};
 pub use part::{Part, PartKind};
 pub use preprocess::{PreprocessOptions, PreprocessReport, build_pyramid, preprocess};
+pub use relight::relight;
 pub use threads::Threads;

@@ -14,7 +14,7 @@ use super::threads::Threads;
 use super::tiles::put_checks;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect, Size};
-use crate::light::LightOptions;
+use crate::light::{Earth, LightOptions};
 use crate::progress::Progress;
 use crate::pyramid::{Filter, Pyramid, rounding_step};
 use crate::source::{self, Description, HeightSource};
@@ -26,6 +26,8 @@ use crate::terrain::{self, LightMeta, Meta, SourceStamp, TerrainWriter};
 pub struct PreprocessOptions {
     /// The light to trace; none leaves it out of the file.
     pub light: Option<LightOptions>,
+    /// Whether light is traced over the earth's curve, with which coefficient of refraction; see [`Earth::of`].
+    pub curvature: Option<f64>,
     /// The filter that makes the levels above 0.
     pub filter: Filter,
     /// Whether to replace a target that exists.
@@ -42,6 +44,7 @@ impl Default for PreprocessOptions {
     fn default() -> Self {
         Self {
             light: Some(LightOptions::default()),
+            curvature: None,
             filter: Filter::default(),
             force: false,
             memory_bytes: DEFAULT_MEMORY_BYTES,
@@ -107,6 +110,8 @@ pub fn preprocess(
     if let Some(light) = &options.light {
         light.sun.check()?;
     }
+    let earth = Earth::of(&description.grid, description.place.as_ref(), options.curvature)
+        .map_err(|e| e.about(&description.name))?;
     let light = options.light.is_some();
     let needed = |grid: &Grid| preprocess_bytes(grid, light, source.held_bytes());
     let advice = if light {
@@ -133,7 +138,7 @@ pub fn preprocess(
     let threads = Threads::new(options.threads)?;
     let (output, file) = Output::create(out, options.force)?;
 
-    let meta = describe(description, rounding_step_m, options, stamp);
+    let meta = describe(description, rounding_step_m, options, &earth, stamp);
     let steps = || {
         let clock = Clock::start();
         let mut report = PreprocessReport {
@@ -161,7 +166,15 @@ pub fn preprocess(
         report.bounds_s = took.bounds_s;
         report.write_s += took.write_s;
         if let Some(light) = &options.light {
-            let took = write_light(&heights, &mut writer, light, &options.filter, &threads, progress)?;
+            let took = write_light(
+                &heights,
+                &mut writer,
+                light,
+                &earth,
+                &options.filter,
+                &threads,
+                progress,
+            )?;
             (report.sun_s, report.sky_s) = (took.sun_s, took.sky_s);
             report.write_s += took.write_s;
         }
@@ -301,8 +314,17 @@ fn describe(
     description: &Description,
     rounding_step_m: Option<f64>,
     options: &PreprocessOptions,
+    earth: &Earth,
     source: SourceStamp,
 ) -> Meta {
+    let mut assumed = description.assumed.clone();
+    let earth = options.light.map(|_| *earth);
+    Earth::assume(
+        earth.as_ref(),
+        description.place.as_ref(),
+        &description.grid,
+        &mut assumed,
+    );
     Meta {
         grid: description.grid,
         place: description.place.clone(),
@@ -317,7 +339,7 @@ fn describe(
         }),
         source,
         tool: terrain::TOOL.into(),
-        assumed: description.assumed.clone(),
+        assumed,
     }
 }
 

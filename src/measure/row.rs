@@ -72,7 +72,7 @@ macro_rules! column {
     };
 }
 
-const COLUMNS: [Column; 31] = [
+const COLUMNS: [Column; 32] = [
     column!(
         "setting",
         "integer",
@@ -257,6 +257,13 @@ const COLUMNS: [Column; 31] = [
         "px",
         "pixels that see through the drawn surface, over the measured frames",
         |r| json!(r.cracks)
+    ),
+    column!(
+        "beside_px",
+        "integer",
+        "px",
+        "pixels whose depth is that of a triangle beside them, measured where a ray meets that triangle, over the measured frames",
+        |r| json!(r.errors.beside_px)
     ),
     column!(
         "silhouette_px",

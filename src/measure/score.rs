@@ -2,7 +2,7 @@
 
 use super::settings::Setting;
 use super::sweep::{Sweep, cancel};
-use crate::accuracy::{DepthImage, ErrorPool, Look, Shading, cracks, measure, psnr_db};
+use crate::accuracy::{DepthImage, ErrorPool, Look, Shading, cracks, measure_drawn, psnr_db};
 use crate::build::Threads;
 use crate::camera::View;
 use crate::clipmap::Drawn;
@@ -81,8 +81,10 @@ impl<'a> Scene<'a> {
             mean_square += PEAK * PEAK * 10f64.powf(-ratio_db / 10.0) / self.frames.len() as f64;
             let depths = headless.read_depth()?;
             let image = DepthImage::new(&depths, &view)?;
-            pool.add(*frame, &measure(&self.truth, &image, self.threads)?);
-            crack_count += cracks(&Drawn::new(headless.clipmap())?, &image, self.threads)?.len() as u64;
+            let surface = Drawn::new(headless.clipmap())?;
+            let errors = measure_drawn(&self.truth, &surface, &image, self.threads)?;
+            pool.add(*frame, &errors);
+            crack_count += cracks(&surface, &image, self.threads)?.len() as u64;
             progress.advance(1);
         }
         let textures = headless.textures();

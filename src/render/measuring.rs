@@ -1,7 +1,7 @@
 //! Measures frames: their depths, one a pixel, against the surface that they draw (cracks) and against `S0` (errors).
 
 use super::headless::{COLOUR_FORMAT, HeadlessOptions};
-use crate::accuracy::{DepthImage, FrameErrors, cracks, measure};
+use crate::accuracy::{DepthImage, FrameErrors, cracks, measure_drawn};
 use crate::build::Threads;
 use crate::camera::View;
 use crate::clipmap::{Clipmap, Drawn};
@@ -94,7 +94,8 @@ impl MeasuringPass {
         depths: &[f32],
     ) -> Result<FrameErrors> {
         let truth = Truth::with_tiles(levels, clipmap.vertical_scale(), &self.tiles);
-        measure(&truth, &DepthImage::new(depths, view)?, &self.threads)
+        let image = DepthImage::new(depths, view)?;
+        measure_drawn(&truth, &Drawn::new(clipmap)?, &image, &self.threads)
     }
 
     /// Cracks of a frame, from its depths.

@@ -23,6 +23,7 @@ mod paths;
 #[cfg(feature = "dem")]
 mod png;
 mod processors;
+mod projection;
 mod raw;
 mod read_at;
 mod sample;
@@ -37,6 +38,7 @@ pub use open::open_bytes;
 pub(crate) use openexr::{Wanted, read_channel};
 pub use options::{Band, Crop, OpenOptions, RawLayout, SampleType};
 pub use paths::{files_of, name_of, open, open_file, open_with};
+pub use projection::OnEarth;
 pub use read_at::{Cursor, ReadAt};
 pub use synth::{MAX_SYNTH_SIZE, Synth};
 #[cfg(feature = "dem")]
