@@ -16,7 +16,7 @@ if [ $# -eq 0 ]; then
     for zip in ../shared/data/sierra/*.zip; do unzip -qo "$zip" -d "$work/hgt"; done
     gdalbuildvrt -q "$work/sierra.vrt" "$work"/hgt/*.hgt
     for type in Int16 Float32; do
-        gdal_translate -q -ot $type -co COMPRESS=DEFLATE -co TILED=YES "$work/sierra.vrt" "$work/sierra_$type.tif"
+        gdal_translate -q -ot $type "$work/sierra.vrt" "$work/sierra_$type.tif"
     done
     set -- "$work/sierra_Int16.tif" "$work/sierra_Float32.tif"
 fi

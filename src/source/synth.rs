@@ -21,8 +21,8 @@ use crate::work::each_chunk;
 /// The greatest size, in samples along a side.
 pub const MAX_SYNTH_SIZE: i64 = 1 << 20;
 
-/// Rows that one task computes.
-const TASK_ROWS: i64 = 16;
+/// Samples that one task computes at least, in whole rows.
+const TASK_SAMPLES: i64 = 1 << 14;
 
 /// Metres between samples.
 const SPACING_M: f64 = 30.0;
