@@ -191,13 +191,14 @@ impl HeightSource for Synth {
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {
         self.check(0, rect, self.size(0), out.len())?;
         if !rect.is_empty() {
+            let task_rows = TASK_SAMPLES / rect.width() + 1;
             each_chunk(
                 &Processors,
                 out,
-                (rect.width() * TASK_ROWS) as usize,
+                (rect.width() * task_rows) as usize,
                 |n, rows| {
-                    let z0 = rect.z0 + n as i64 * TASK_ROWS;
-                    let z1 = (z0 + TASK_ROWS).min(rect.z1);
+                    let z0 = rect.z0 + n as i64 * task_rows;
+                    let z1 = (z0 + task_rows).min(rect.z1);
                     self.fill(0, Rect::new(rect.x0, z0, rect.x1, z1), rows);
                 },
             );
