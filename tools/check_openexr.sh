@@ -12,7 +12,9 @@ cargo build --release --quiet --no-default-features --features dem,cli
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 target/release/clipscape preprocess "$dem" -o "$work/t.terrain.exr" --no-light --quiet
-exrinfo "$work/t.terrain.exr" > "$work/exrinfo"
+# The status of version 3.1 means nothing: it differs from run to run, for files of OpenEXR's own making too. What it
+# prints is looked at below.
+exrinfo "$work/t.terrain.exr" > "$work/exrinfo" 2>&1 || true
 gdal_translate -q -of ENVI -ot Float32 "$dem" "$work/raw"
 ${PYTHON:-python3} - "$work/t.terrain.exr" "$work/raw" "$work/exrinfo" <<'PYTHON'
 import sys
@@ -50,7 +52,7 @@ for name, (shape, channels) in want.items():
     assert part.header["type"] == OpenEXR.Storage.tiledimage and part.header["compression"] == OpenEXR.ZIP_COMPRESSION
     tile = part.header["tiles"]
     assert (tile.xSize, tile.ySize) == (256, 256), name
-    assert f"'{name}'" in open(told).read() or name in open(told).read(), f"exrinfo does not name {name}"
+    assert f": {name}\n" in open(told).read(), f"exrinfo does not name {name}"
 truth = numpy.fromfile(raw, dtype="<f4").reshape(height.shape)
 void = numpy.isnan(height)
 assert numpy.array_equal(height[~void], truth[~void]), "heights differ from GDAL's"
