@@ -132,6 +132,17 @@ pub trait Levels: Send + Sync {
         let _ = wanted;
     }
 
+    /// Changes when better data take the place of those that were given so far: whoever holds any asks for them anew. It
+    /// never changes but in this call, so that whoever calls it once a frame sees no two editions in one.
+    fn edition(&self) -> u64 {
+        0
+    }
+
+    /// Whether what is given stands in for data that are not there yet: its errors are not known.
+    fn is_provisional(&self) -> bool {
+        false
+    }
+
     /// Takes the faults that were met since the last call and did not end a call.
     fn faults(&self) -> Vec<Error> {
         Vec::new()

@@ -6,7 +6,8 @@
 //! 2. It is *filtered* into ever coarser levels, and each patch of each level bounded: [`pyramid`].
 //! 3. Light is *traced* over the finest level and filtered likewise: [`light`].
 //! 4. All of it is *stored* in a terrain file: [`build`] drives, [`terrain`] writes and reads.
-//! 5. Any of these answers as [`levels::Levels`]; [`stream::Terrain`] opens whatever a user names.
+//! 5. Any of these answers as [`levels::Levels`]; [`stream::Terrain`] opens whatever a user names, and brings it tile by
+//!    tile to views that do not wait.
 //! 6. Around the camera, each level's window is *made resident*: [`clipmap::Window`], moved by the rectangles of
 //!    [`clipmap::UpdatePlan`]; [`clipmap::Selection`] lists the patches to draw.
 //! 7. The GPU holds copies of the windows ([`gpu::ViewTextures`]). A vertex is *displaced* in
@@ -18,6 +19,7 @@
 //!    constants of [`shade`].
 //! 10. [`render`] makes headless frames of it: pictures, contact sheets, animations, statistics.
 //! 11. [`measure`] flies many settings and reports what each costs and how wrong it is.
+//! 12. [`window`] flies through it on a screen.
 //!
 //! Underneath all: [`grid`] is the only index arithmetic, [`error::Error`] the only error, [`camera`] says what is
 //! seen. Each room knows those above it in this file and none below.
@@ -66,6 +68,9 @@ pub mod render;
 
 #[cfg(feature = "gpu")]
 pub mod measure;
+
+#[cfg(feature = "window")]
+pub mod window;
 
 #[cfg(feature = "cli")]
 pub mod cli;

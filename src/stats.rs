@@ -52,6 +52,8 @@ pub struct FrameStats {
     pub stale_levels: u32,
     /// Patches whose detail vanished at once, because their data came too late to be taken back gently.
     pub pops: u64,
+    /// Whether some of what was resident stood in for data that were not there yet.
+    pub provisional: bool,
     /// Greatest error on the screen, in pixels ([`crate::accuracy`] says what is measured); null unless measured, as all
     /// up to `silhouette_px`.
     pub error_px_max: Option<f64>,
@@ -118,6 +120,8 @@ pub struct Run {
     pub input_checksum: Option<String>,
     /// Faults met on the way that did not end the run.
     pub faults: u64,
+    /// The fastest flight at which every level would have stayed fresh, by what loading took; none where nothing limits it.
+    pub fastest_fresh_m_s: Option<f64>,
     /// The errors of all frames together, where they were measured.
     pub errors: Option<PooledErrors>,
 }
@@ -161,6 +165,9 @@ pub struct SummaryStats {
     pub input_checksum: Option<String>,
     /// Faults met on the way that did not end the run.
     pub faults: u64,
+    /// The fastest flight in m/s at which every level would have stayed fresh, by what loading tiles took; null where that
+    /// is not known, or nothing limits it.
+    pub fastest_fresh_m_s: Option<f64>,
     /// The greatest error that is certified of any frame; null where one has no certificate.
     pub certified_error_px: Option<f64>,
     /// Frames that keep the promised error; null where none was promised.
@@ -213,6 +220,7 @@ impl SummaryStats {
             flight_checksum: run.flight_checksum,
             input_checksum: run.input_checksum,
             faults: run.faults,
+            fastest_fresh_m_s: run.fastest_fresh_m_s.filter(|v| v.is_finite()),
             certified_error_px: frames
                 .iter()
                 .map(|f| f.certified_error_px)
@@ -288,6 +296,7 @@ mod tests {
             cut: false,
             stale_levels: 0,
             pops: 0,
+            provisional: false,
             error_px_max: Some(0.5 * frame as f64),
             error_px_p99: None,
             error_px_rms: None,
@@ -333,7 +342,8 @@ mod tests {
         let names: Vec<&str> = json.split('"').skip(1).step_by(2).collect();
         let documented = "frame t_s eye plan_ms certify_ms upload_ms draw_ms gpu_ms frame_ms triangles draw_calls \
             patches patches_culled levels_drawn uploads upload_bytes upload_bytes_exposed complete cut stale_levels pops \
-            error_px_max error_px_p99 error_px_rms error_m_max error_floor_px cracks beside_px silhouette_px certified_error_px \
+            provisional error_px_max error_px_p99 error_px_rms error_m_max error_floor_px cracks beside_px silhouette_px \
+            certified_error_px \
             certificate_reason max_error_px keeps_max_error";
         assert_eq!(names, documented.split_whitespace().collect::<Vec<_>>());
         assert!(

@@ -3,22 +3,30 @@
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Size};
 
-/// The ceiling unless another is given: 2 GiB.
-pub const DEFAULT_MEMORY_BYTES: u64 = 2 << 30;
+/// The ceiling of preprocessing unless another is given: 512 MiB.
+pub const DEFAULT_MEMORY_BYTES: u64 = 512 << 20;
 
-/// Bytes a sample of level 0 takes at the peak: heights of all levels and their bounds alone (measured at 4096 x
-/// 4096 over a source that holds nothing: 6.8), or light and what tracing and filtering it take as well (22.3); and 4
-/// for a source that holds its heights.
+/// The ceiling of a pyramid that is held whole, unless another is given: 2 GiB.
+pub const HELD_MEMORY_BYTES: u64 = 2 << 30;
+
+/// Bytes a sample of level 0 takes at the peak where all is held: heights of all levels and their bounds alone (measured
+/// at 4096 x 4096 over a source that holds nothing: 6.8), or light and what tracing and filtering it take as well (22.3);
+/// and 4 for a source that holds its heights.
 const BYTES_A_SAMPLE: u64 = 12;
 const BYTES_A_SAMPLE_WITH_LIGHT: u64 = 30;
 
 /// Bytes a column or row takes while light is traced: the table of a ray's crossings with cell edges.
 const BYTES_A_LINE_WITH_LIGHT: u64 = 192;
 
+/// Bytes a column of level 0 takes in either pass of preprocessing: in the first two bands of the DEM (2 KiB), the rows of
+/// the coarser levels (1.4 KiB) and those under the kernels (0.2 KiB with 4 lobes); in the second the rows of the coarser
+/// levels (1.4 KiB) and of bounds (1.7 KiB), and while these are packed some of them twice.
+const BYTES_A_COLUMN: u64 = 4096;
+
 /// What does not depend on the DEM: the program, and tiles being compressed.
 const FIXED_BYTES: u64 = 64 << 20;
 
-/// The memory that preprocessing a DEM of `grid` takes, in bytes.
+/// The memory that the pyramid of a DEM of `grid` takes where it is held whole, in bytes.
 pub fn needed_bytes(grid: &Grid, light: bool) -> u64 {
     let (a_sample, a_line) = if light {
         (BYTES_A_SAMPLE_WITH_LIGHT, BYTES_A_LINE_WITH_LIGHT)
@@ -31,11 +39,27 @@ pub fn needed_bytes(grid: &Grid, light: bool) -> u64 {
         .saturating_add(FIXED_BYTES)
 }
 
-/// Refuses a DEM called `name` whose grid is impossible or that needs more than `ceiling_bytes`.
-pub(super) fn check(name: &str, grid: &Grid, light: bool, ceiling_bytes: u64) -> Result<()> {
+/// The memory that preprocessing a DEM of `grid` takes, in bytes, where its source holds `held_bytes`: whatever its
+/// height, unless light is traced, for which level 0 and its light are held.
+pub fn preprocess_bytes(grid: &Grid, light: bool, held_bytes: u64) -> u64 {
+    let passes = (grid.size.width as u64)
+        .saturating_mul(BYTES_A_COLUMN)
+        .saturating_add(FIXED_BYTES);
+    let light = if light { needed_bytes(grid, true) } else { 0 };
+    passes.max(light).saturating_add(held_bytes)
+}
+
+/// Refuses a DEM called `name` whose grid is impossible, or of which something needs more than `ceiling_bytes`.
+pub(super) fn check(
+    name: &str,
+    grid: &Grid,
+    needed: impl Fn(&Grid) -> u64,
+    ceiling_bytes: u64,
+    advice: &str,
+) -> Result<()> {
     grid.check()
         .map_err(|what| Error::new(ErrorKind::Misuse, name, what))?;
-    let needed = needed_bytes(grid, light);
+    let needed = needed(grid);
     if needed <= ceiling_bytes {
         return Ok(());
     }
@@ -46,7 +70,7 @@ pub(super) fn check(name: &str, grid: &Grid, light: bool, ceiling_bytes: u64) ->
         mib(needed),
         ceiling_bytes >> 20
     );
-    let advice = format!("allow {} MiB, or cut the DEM", mib(needed));
+    let advice = format!("allow {} MiB, {advice}", mib(needed));
     Err(Error::new(ErrorKind::Limit, name, what).advice(advice))
 }
 
@@ -69,25 +93,35 @@ mod tests {
     #[test]
     fn a_dem_above_the_ceiling_is_refused_with_the_number_it_needs() {
         let grid = Grid::new(13201, 13201, [1.0, 1.0]);
-        let needed = needed_bytes(&grid, true);
-        assert!(check("a.tif", &grid, true, needed).is_ok());
-        let error = check("a.tif", &grid, true, needed - 1).unwrap_err();
+        let with = |light| move |grid: &Grid| preprocess_bytes(grid, light, 0);
+        let needed = preprocess_bytes(&grid, true, 0);
+        assert!(check("a.tif", &grid, with(true), needed, "or cut it").is_ok());
+        let error = check("a.tif", &grid, with(true), needed - 1, "or cut it").unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Limit);
-        assert!(
-            error
-                .to_string()
-                .contains(&format!("{} MiB", needed.div_ceil(1 << 20))),
-            "{error}"
-        );
-        assert!(needed_bytes(&grid, false) < needed);
+        let number = format!("{} MiB", needed.div_ceil(1 << 20));
+        assert!(error.to_string().contains(&number), "{error}");
+        assert!(preprocess_bytes(&grid, false, 0) < needed);
         let most = Grid::new(1 << 30, 1 << 30, [1.0, 1.0]);
-        assert_eq!(needed_bytes(&most, true), u64::MAX, "more than can be counted");
-        assert!(check("a.tif", &most, true, u64::MAX - 1).is_err());
+        assert_eq!(
+            preprocess_bytes(&most, true, 5),
+            u64::MAX,
+            "more than can be counted"
+        );
+        assert!(check("a.tif", &most, with(true), u64::MAX - 1, "or cut it").is_err());
         let none = Grid::new(i64::MAX, i64::MAX, [1.0, 1.0]);
         assert_eq!(
-            check("a.tif", &none, true, u64::MAX).unwrap_err().kind(),
+            check("a.tif", &none, with(true), u64::MAX, "or cut it")
+                .unwrap_err()
+                .kind(),
             ErrorKind::Misuse
         );
+    }
+
+    #[test]
+    fn without_light_the_height_of_a_dem_costs_nothing() {
+        let of = |width, height| preprocess_bytes(&Grid::new(width, height, [1.0, 1.0]), false, 7);
+        assert_eq!(of(1000, 1), of(1000, 1 << 30));
+        assert_eq!(of(65_536, 1), (64 << 20) + 65_536 * 4096 + 7);
     }
 
     #[test]

@@ -1,22 +1,32 @@
 //! Preprocessing: from a DEM to a terrain file, or to a pyramid in memory.
 //!
-//! [`preprocess`] drives the rooms above it: [`crate::source`] is read, [`crate::pyramid`] filters and bounds it,
-//! [`crate::light`] traces sun and sky, [`crate::terrain`] writes the file. [`build_pyramid`] stops before the
-//! light. All levels are held in memory: what that takes is computed beforehand and refused above a ceiling.
+//! [`preprocess`] drives the rooms above it, in passes from north to south: `heights` reads [`crate::source`] band by
+//! band, filters it by [`crate::pyramid`] and writes the tiles of all levels through [`crate::terrain`]; `bounds` reads
+//! them back and writes the bounds; `light` traces sun and sky over them by [`crate::light`]. What is held depends on the
+//! DEM's width alone, except for light: it is computed beforehand, and more than the ceiling is refused.
+//! [`build_pyramid`] holds all levels in memory instead, for who draws a DEM without a file.
+//! [`relight`] gives a terrain file other light.
 //! [`Part`] is a level's heights, light or error as a DEM of its own, to be written as one.
 //! [`Threads`] shares the work out; results do not depend on their number.
 
+mod bands;
+mod bounds;
+mod heights;
+mod light;
 mod memory;
 mod output;
 mod part;
 mod preprocess;
+mod relight;
 #[cfg(test)]
 mod tests;
 mod threads;
+mod tiles;
 
 pub use crate::terrain::SourceStamp;
-pub use memory::{DEFAULT_MEMORY_BYTES, needed_bytes, peak_rss_bytes};
+pub use memory::{DEFAULT_MEMORY_BYTES, HELD_MEMORY_BYTES, needed_bytes, peak_rss_bytes, preprocess_bytes};
 pub use output::{Output, refuse_existing};
 pub use part::{Part, PartKind};
 pub use preprocess::{PreprocessOptions, PreprocessReport, build_pyramid, preprocess};
+pub use relight::relight;
 pub use threads::Threads;

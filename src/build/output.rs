@@ -73,6 +73,11 @@ impl Output {
         &self.target
     }
 
+    /// Where the file is until then.
+    pub(super) fn temporary(&self) -> &Path {
+        &self.temporary
+    }
+
     /// Syncs the file and gives it its name. Without `force` a target that has appeared meanwhile stays.
     ///
     /// # Errors

@@ -1,29 +1,33 @@
-//! The steps from a DEM to a terrain file: read, filter, bound, light, write.
+//! The steps from a DEM to a terrain file: heights, bounds, light.
 
 use std::io::BufWriter;
 use std::path::Path;
 use std::time::Instant;
 
-use super::memory::{self, DEFAULT_MEMORY_BYTES, peak_rss_bytes};
+use super::bands::BAND_ROWS;
+use super::bounds::write_bounds;
+use super::heights::write_heights;
+use super::light::write_light;
+use super::memory::{self, DEFAULT_MEMORY_BYTES, HELD_MEMORY_BYTES, peak_rss_bytes, preprocess_bytes};
 use super::output::Output;
 use super::threads::Threads;
+use super::tiles::put_checks;
 use crate::error::{Error, ErrorKind, Result};
-use crate::grid::{Rect, Size};
-use crate::light::{LightOptions, light_levels, sky_share, sun_share};
+use crate::grid::{Grid, Rect, Size};
+use crate::light::{Earth, LightOptions};
 use crate::progress::Progress;
-use crate::pyramid::{Filter, Pyramid};
-use crate::source::{Description, HeightSource};
+use crate::pyramid::{Filter, Pyramid, rounding_step};
+use crate::source::{self, Description, HeightSource};
 use crate::terrain::layout::Layout;
-use crate::terrain::{self, LightMeta, Meta, SourceStamp};
-
-/// Rows that are read at once.
-const BAND_ROWS: i64 = 256;
+use crate::terrain::{self, LightMeta, Meta, SourceStamp, TerrainWriter};
 
 /// How to make a terrain file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PreprocessOptions {
     /// The light to trace; none leaves it out of the file.
     pub light: Option<LightOptions>,
+    /// Whether light is traced over the earth's curve, with which coefficient of refraction; see [`Earth::of`].
+    pub curvature: Option<f64>,
     /// The filter that makes the levels above 0.
     pub filter: Filter,
     /// Whether to replace a target that exists.
@@ -40,6 +44,7 @@ impl Default for PreprocessOptions {
     fn default() -> Self {
         Self {
             light: Some(LightOptions::default()),
+            curvature: None,
             filter: Filter::default(),
             force: false,
             memory_bytes: DEFAULT_MEMORY_BYTES,
@@ -52,11 +57,11 @@ impl Default for PreprocessOptions {
 /// What preprocessing took and cost.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PreprocessReport {
-    /// Seconds to read the DEM.
+    /// Seconds that the work waited for the DEM to be read, which goes on beside it.
     pub read_s: f64,
     /// Seconds to filter the heights into levels.
     pub pyramid_s: f64,
-    /// Seconds for the bounds.
+    /// Seconds to read heights back and measure the bounds.
     pub bounds_s: f64,
     /// Seconds to trace the sun's share.
     pub sun_s: f64,
@@ -105,66 +110,88 @@ pub fn preprocess(
     if let Some(light) = &options.light {
         light.sun.check()?;
     }
+    let earth = Earth::of(&description.grid, description.place.as_ref(), options.curvature)
+        .map_err(|e| e.about(&description.name))?;
+    let light = options.light.is_some();
+    let needed = |grid: &Grid| preprocess_bytes(grid, light, source.held_bytes());
+    let advice = if light {
+        "leave out the light, or cut the DEM"
+    } else {
+        "or cut the DEM"
+    };
     memory::check(
         &description.name,
         &description.grid,
-        options.light.is_some(),
+        needed,
         options.memory_bytes,
+        advice,
     )?;
+    let rounding_step_m = description
+        .step_m
+        .map(|step| {
+            let what = || format!("a height step of {step} m is not above 0 and finite");
+            rounding_step(step).ok_or_else(|| Error::new(ErrorKind::Misuse, &description.name, what()))
+        })
+        .transpose()?;
     Layout::new(&description.grid, options.light.is_some())
         .map_err(|what| Error::new(ErrorKind::Limit, &description.name, what).advice("cut the DEM"))?;
     let threads = Threads::new(options.threads)?;
     let (output, file) = Output::create(out, options.force)?;
 
+    let meta = describe(description, rounding_step_m, options, &earth, stamp);
     let steps = || {
-        let mut clock = Clock::start();
+        let clock = Clock::start();
         let mut report = PreprocessReport {
             samples: description.grid.size.samples() as u64,
             threads: threads.count(),
             ..PreprocessReport::default()
         };
-        let heights = read(source, progress)?;
-        report.rounding_m = rounding_m(description, &heights);
-        report.read_s = clock.lap();
-        let mut pyramid = Pyramid::new(
-            description.grid,
-            heights,
-            description.step_m,
+        let buffered = BufWriter::with_capacity(1 << 20, &file);
+        let mut writer = TerrainWriter::new(buffered, &meta)?;
+        let found = write_heights(
+            source,
+            &mut writer,
             &options.filter,
+            rounding_step_m,
             &threads,
             progress,
         )?;
-        report.overshoot_m = pyramid.overshoot_m().into();
-        report.pyramid_s = clock.lap();
-        pyramid.bound(&threads, progress)?;
-        report.bounds_s = clock.lap();
+        report.overshoot_m = found.overshoot_m.into();
+        report.rounding_m = rounding_m(description, found.greatest_m);
+        (report.read_s, report.pyramid_s, report.write_s) = (found.read_s, found.pyramid_s, found.write_s);
+
+        let name = out.display().to_string();
+        let heights = writer.readable(&name, &meta, || source::open_file(output.temporary()))?;
+        let took = write_bounds(&heights, &mut writer, &threads, progress)?;
+        report.bounds_s = took.bounds_s;
+        report.write_s += took.write_s;
         if let Some(light) = &options.light {
-            let (grid, heights) = (&description.grid, pyramid.level(0));
-            let sun = sun_share(heights, grid, light.sun, &threads, progress)?;
-            report.sun_s = clock.lap();
-            let sky = sky_share(heights, grid, light.sky_directions, &threads, progress)?;
-            let levels = light_levels(grid, heights, sun, sky, &options.filter, &threads, progress)?;
-            pyramid.set_light(levels)?;
-            report.sky_s = clock.lap();
+            let took = write_light(
+                &heights,
+                &mut writer,
+                light,
+                &earth,
+                &options.filter,
+                &threads,
+                progress,
+            )?;
+            (report.sun_s, report.sky_s) = (took.sun_s, took.sky_s);
+            report.write_s += took.write_s;
         }
-        let meta = describe(description, &pyramid, options, stamp);
-        let buffered = BufWriter::with_capacity(1 << 20, &file);
-        terrain::write(buffered, &meta, &pyramid, &threads, progress).map_err(|e| {
-            if e.subject() == "terrain file" {
-                e.about(out.display())
-            } else {
-                e
-            }
-        })?;
+        let mut clock = clock;
+        clock.lap();
+        put_checks(&mut writer, &threads, progress)?;
+        writer.finish()?;
         Ok((report, clock))
     };
     let result: Result<(PreprocessReport, Clock)> = steps();
     let (mut report, mut clock) = match result {
         Err(e) if e.kind() == ErrorKind::Cancelled => return Err(Error::cancelled(&description.name)),
+        Err(e) if e.subject() == "terrain file" => return Err(e.about(out.display())),
         other => other?,
     };
     output.publish(&file)?;
-    report.write_s = clock.lap();
+    report.write_s += clock.lap();
     report.total_s = clock.total();
     report.peak_rss_bytes = peak_rss_bytes();
     Ok(report)
@@ -173,11 +200,18 @@ pub fn preprocess(
 /// Reads `source` whole and builds its pyramid with bounds, without light: what rendering a raw DEM needs.
 ///
 /// # Errors
-/// [`ErrorKind::Limit`] where it needs more than [`DEFAULT_MEMORY_BYTES`]; [`ErrorKind::Cancelled`]; and what reading
+/// [`ErrorKind::Limit`] where it needs more than [`HELD_MEMORY_BYTES`]; [`ErrorKind::Cancelled`]; and what reading
 /// meets.
 pub fn build_pyramid(source: &dyn HeightSource, filter: &Filter, progress: &dyn Progress) -> Result<Pyramid> {
     let description = source.description();
-    memory::check(&description.name, &description.grid, false, DEFAULT_MEMORY_BYTES)?;
+    let needed = |grid: &Grid| memory::needed_bytes(grid, false);
+    memory::check(
+        &description.name,
+        &description.grid,
+        needed,
+        HELD_MEMORY_BYTES,
+        "preprocess it, or cut it",
+    )?;
     let threads = Threads::new(0)?;
     let heights = read(source, progress)?;
     let mut pyramid = Pyramid::new(
@@ -259,12 +293,8 @@ fn read(source: &dyn HeightSource, progress: &dyn Progress) -> Result<Vec<f32>> 
 }
 
 /// Upper bound of what rounding heights to f32 cost, in metres: 0 where the source's own type and step show
-/// that f32 holds each of them, else half the spacing of f32 at the greatest.
-fn rounding_m(description: &Description, heights: &[f32]) -> f64 {
-    let most = heights
-        .iter()
-        .filter(|h| h.is_finite())
-        .fold(0f32, |most, h| most.max(h.abs()));
+/// that f32 holds each of them, else half the spacing of f32 at the greatest, which is `most` in size.
+fn rounding_m(description: &Description, most: f32) -> f64 {
     let as_metres = matches!(description.vertical_unit.as_str(), "metre" | "unknown");
     let power_of_two = |step: f64| step.is_normal() && step.to_bits() << 12 == 0;
     let exact = as_metres
@@ -282,17 +312,26 @@ fn rounding_m(description: &Description, heights: &[f32]) -> f64 {
 
 fn describe(
     description: &Description,
-    pyramid: &Pyramid,
+    rounding_step_m: Option<f64>,
     options: &PreprocessOptions,
+    earth: &Earth,
     source: SourceStamp,
 ) -> Meta {
+    let mut assumed = description.assumed.clone();
+    let earth = options.light.map(|_| *earth);
+    Earth::assume(
+        earth.as_ref(),
+        description.place.as_ref(),
+        &description.grid,
+        &mut assumed,
+    );
     Meta {
         grid: description.grid,
         place: description.place.clone(),
         vertical_unit: description.vertical_unit.clone(),
         filter: options.filter.kind().name().into(),
         lobes: options.filter.lobes(),
-        rounding_step_m: pyramid.rounding_step_m(),
+        rounding_step_m,
         light: options.light.map(|light| LightMeta {
             sun_azimuth_deg: light.sun.azimuth_deg,
             sun_altitude_deg: light.sun.altitude_deg,
@@ -300,14 +339,13 @@ fn describe(
         }),
         source,
         tool: terrain::TOOL.into(),
-        assumed: description.assumed.clone(),
+        assumed,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::Grid;
 
     fn described(sample_type: &str, step_m: Option<f64>, unit: &str) -> Description {
         Description {
@@ -325,9 +363,10 @@ mod tests {
     #[test]
     fn rounding_is_0_only_where_f32_holds_every_height() {
         let of = |sample_type, step, unit, heights: &[f32]| {
-            rounding_m(&described(sample_type, step, unit), heights)
+            let most = heights.iter().fold(0f32, |most, h| most.max(h.abs()));
+            rounding_m(&described(sample_type, step, unit), most)
         };
-        assert_eq!(of("float32", None, "metre", &[0.1, f32::NAN]), 0.0);
+        assert_eq!(of("float32", None, "metre", &[0.1]), 0.0);
         assert_eq!(of("int16", Some(1.0), "unknown", &[-3.0, 2000.0]), 0.0);
         assert_eq!(of("int16", Some(0.25), "metre", &[-3.0, 2000.25]), 0.0);
         // 0.1 has no exact f32; 2000 lies among those that are 2^-13 apart.

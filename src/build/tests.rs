@@ -283,3 +283,99 @@ fn a_full_disk_is_one_line() {
     assert_eq!(error.kind(), ErrorKind::Io);
     assert!(error.to_string().contains("the disk is full"), "{error}");
 }
+
+/// Every tile of a file's height and bounds parts, as it is stored.
+fn stored(path: &Path) -> Vec<Vec<u8>> {
+    let file = std::io::BufReader::new(fs::File::open(path).unwrap());
+    let reader = exr::block::read(file, false).unwrap();
+    let meta = reader.meta_data().clone();
+    let chunks = reader.all_chunks(false).unwrap().map(|chunk| chunk.unwrap());
+    let mut tiles: Vec<(String, Vec<u8>)> = chunks
+        .map(|chunk| {
+            let exr::block::chunk::CompressedBlock::Tile(tile) = chunk.compressed_block else {
+                panic!("all parts are tiled");
+            };
+            let name = &meta.headers[chunk.layer_index].own_attributes.layer_name;
+            let at = tile.coordinates.tile_index;
+            (format!("{name:?} {at:?}"), tile.compressed_pixels_le)
+        })
+        .filter(|(name, _)| name.contains("height") || name.contains("bounds"))
+        .collect();
+    tiles.sort();
+    tiles.into_iter().map(|(_, bytes)| bytes).collect()
+}
+
+#[test]
+fn a_terrain_file_is_lit_anew_and_keeps_its_heights() {
+    let folder = tempfile::tempdir().unwrap();
+    let hills = Hills::new(300, 290);
+    let [first, second, other] =
+        ["a", "b", "c"].map(|name| folder.path().join(name).with_extension("terrain.exr"));
+    preprocess(&hills, &first, &options(2), &Silent).unwrap();
+    let low = PreprocessOptions {
+        light: Some(LightOptions {
+            sun: crate::light::Sun {
+                azimuth_deg: 80.0,
+                altitude_deg: 9.0,
+            },
+            sky_directions: 3,
+        }),
+        ..options(1)
+    };
+    preprocess(&hills, &other, &low, &Silent).unwrap();
+    relight(&open(&first), &second, &low, &Silent).unwrap();
+    assert_eq!(
+        fs::read(&second).unwrap(),
+        fs::read(&other).unwrap(),
+        "as if made so"
+    );
+    assert_eq!(stored(&first), stored(&second));
+    assert!(stored(&first).len() > 8);
+    // A control: the light is another.
+    assert_ne!(fs::read(&first).unwrap(), fs::read(&second).unwrap());
+
+    // In place, but only where that is asked for; and back again, and without light.
+    let before = fs::read(&second).unwrap();
+    let refused = relight(&open(&second), &second, &options(1), &Silent).unwrap_err();
+    assert_eq!(refused.kind(), ErrorKind::Misuse);
+    assert_eq!(fs::read(&second).unwrap(), before);
+    let force = PreprocessOptions {
+        force: true,
+        ..options(1)
+    };
+    relight(&open(&second), &second, &force, &Silent).unwrap();
+    assert_eq!(fs::read(&second).unwrap(), fs::read(&first).unwrap());
+    let dark = PreprocessOptions {
+        light: None,
+        ..force.clone()
+    };
+    relight(&open(&second), &second, &dark, &Silent).unwrap();
+    assert!(!open(&second).has_light());
+    assert_eq!(stored(&first), stored(&second));
+
+    // Too little memory, cancelled, curved over no known earth: refused, and nothing is left.
+    let before = fs::read(&second).unwrap();
+    let little = PreprocessOptions {
+        memory_bytes: 1 << 20,
+        ..force.clone()
+    };
+    let curved = PreprocessOptions {
+        curvature: Some(0.13),
+        ..force.clone()
+    };
+    struct Stop;
+    impl Progress for Stop {
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    let kinds = [
+        relight(&open(&first), &second, &little, &Silent),
+        relight(&open(&first), &second, &curved, &Silent),
+        relight(&open(&first), &second, &force, &Stop),
+    ]
+    .map(|result| result.unwrap_err().kind());
+    assert_eq!(kinds, [ErrorKind::Limit, ErrorKind::Misuse, ErrorKind::Cancelled]);
+    assert_eq!(fs::read(&second).unwrap(), before);
+    assert_eq!(entries(folder.path()), 3);
+}

@@ -1,5 +1,8 @@
 //! What may be typed: commands, their options, and the help of each.
 
+mod cache;
+#[cfg(feature = "window")]
+mod fly;
 mod input;
 #[cfg(feature = "gpu")]
 mod measure;
@@ -10,15 +13,18 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+pub(super) use self::cache::{CacheAction, CacheArgs};
+#[cfg(feature = "window")]
+pub(super) use self::fly::FlyArgs;
 pub(super) use self::input::InputArgs;
 #[cfg(feature = "gpu")]
 pub(super) use self::measure::MeasureArgs;
 #[cfg(feature = "gpu")]
-pub(super) use self::render::{RenderArgs, ViewArgs};
+pub(super) use self::render::{CameraArgs, RenderArgs, ViewArgs};
 use super::values;
 #[cfg(feature = "dem")]
 use crate::build::PartKind;
-use crate::light::{DEFAULT_SKY_DIRECTIONS, Sun};
+use crate::light::{DEFAULT_SKY_DIRECTIONS, Moment, Sun};
 use crate::pyramid::FilterKind;
 
 /// A terrain geometry clipmap engine: from a DEM to frames, and how wrong they are.
@@ -41,8 +47,11 @@ pub(super) enum Command {
     Preprocess(PreprocessArgs),
     #[cfg(feature = "gpu")]
     Render(Box<RenderArgs>),
+    #[cfg(feature = "window")]
+    Fly(Box<FlyArgs>),
     #[cfg(feature = "gpu")]
     Measure(Box<MeasureArgs>),
+    Cache(CacheArgs),
     #[cfg(feature = "dem")]
     Export(ExportArgs),
     #[cfg(feature = "dem")]
@@ -68,13 +77,13 @@ pub(super) struct InfoArgs {
     pub(super) quiet: bool,
 }
 
-/// Make a terrain file of a DEM: all its levels, their bounds, and light.
+/// Make a terrain file of a DEM: all its levels, their bounds, and light. Of a terrain file, light it anew.
 #[derive(Debug, Args)]
 pub(super) struct PreprocessArgs {
     #[command(flatten)]
     pub(super) input: InputArgs,
 
-    /// The terrain file [default: STEM.terrain.exr beside the input]
+    /// The terrain file [default: STEM.terrain.exr beside the input, which may be the input itself]
     #[arg(long, short, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
 
@@ -86,15 +95,34 @@ pub(super) struct PreprocessArgs {
     #[arg(long, value_name = "AZIMUTH,ALTITUDE", value_parser = values::sun, allow_hyphen_values = true)]
     pub(super) sun: Option<Sun>,
 
+    /// Where the sun stands at a time, as in 2026-06-21T09:00:00Z, over the middle of the DEM
+    #[arg(long, value_name = "TIME", value_parser = values::moment, conflicts_with_all = ["sun", "no_light"])]
+    pub(super) sun_at: Option<Moment>,
+
+    /// Degrees north of the equator from where --sun-at sees the sun, in place of the DEM's middle
+    #[arg(long, value_name = "DEGREES", value_parser = values::latitude, allow_hyphen_values = true)]
+    #[arg(requires_all = ["sun_at", "lon"])]
+    pub(super) lat: Option<f64>,
+
+    /// Degrees east of Greenwich likewise
+    #[arg(long, value_name = "DEGREES", value_parser = values::number, allow_hyphen_values = true)]
+    #[arg(requires_all = ["sun_at", "lat"])]
+    pub(super) lon: Option<f64>,
+
+    /// Trace light over the earth's curve, with this coefficient of refraction [0.13 where none is given]
+    #[arg(long, value_name = "K", value_parser = values::refraction, conflicts_with = "no_light")]
+    #[arg(num_args = 0..=1, require_equals = true, default_missing_value = "0.13")]
+    pub(super) curvature: Option<f64>,
+
     /// Directions in which the sky is looked for; 0 leaves the terrain out of its share
     #[arg(long, value_name = "N", default_value_t = DEFAULT_SKY_DIRECTIONS)]
     #[arg(value_parser = clap::value_parser!(u32).range(0..=3600), allow_negative_numbers = true)]
     pub(super) sky_directions: u32,
 
-    /// How coarser levels are made: point, box, bilinear, cubic, lanczos3, sinc-blackman or sinc-blackman-clamped
-    #[arg(long, value_name = "NAME", value_parser = values::filter(), default_value = FilterKind::default().name())]
-    #[arg(hide_possible_values = true)]
-    pub(super) filter: FilterKind,
+    /// How coarser levels are made: point, box, bilinear, cubic, lanczos3, sinc-blackman (unless told otherwise) or
+    /// sinc-blackman-clamped
+    #[arg(long, value_name = "NAME", value_parser = values::filter(), hide_possible_values = true)]
+    pub(super) filter: Option<FilterKind>,
 
     /// Refuse a DEM that needs more memory than this, as in 512M or 2GiB
     #[arg(long, value_name = "BYTES", value_parser = values::bytes)]

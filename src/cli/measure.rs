@@ -4,7 +4,7 @@ use super::args::MeasureArgs;
 use super::progress::Terminal;
 use super::render::{checksum, command_line, files_checksum, read_flight};
 use super::{Outcome, measure_depth};
-use crate::build::DEFAULT_MEMORY_BYTES;
+use crate::build::HELD_MEMORY_BYTES;
 use crate::camera::{Flight, check_picture};
 use crate::clipmap::ClipmapOptions;
 use crate::error::{Error, ErrorKind};
@@ -58,7 +58,7 @@ pub(super) fn run(args: &MeasureArgs, terminal: &Terminal) -> Outcome {
             sun: terrain.sun().or(args.sun).unwrap_or_default(),
             clipmap,
         },
-        memory_bytes: args.memory.unwrap_or(DEFAULT_MEMORY_BYTES),
+        memory_bytes: args.memory.unwrap_or(HELD_MEMORY_BYTES),
     };
     let run = Run {
         device: gpu.info.name.clone(),

@@ -2,8 +2,11 @@
 //! error, an error as one line: `clipscape: SUBJECT: what is wrong; what to do`.
 
 mod args;
+mod cache;
 #[cfg(feature = "dem")]
 mod export;
+#[cfg(feature = "window")]
+mod fly;
 mod info;
 mod input;
 #[cfg(feature = "gpu")]
@@ -58,8 +61,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Preprocess(args) => preprocess::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "gpu")]
         Command::Render(args) => render::run(&args, &Terminal::new(args.quiet)),
+        #[cfg(feature = "window")]
+        Command::Fly(args) => fly::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "gpu")]
         Command::Measure(args) => measure::run(&args, &Terminal::new(args.quiet)),
+        Command::Cache(args) => cache::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "dem")]
         Command::Export(args) => export::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "dem")]

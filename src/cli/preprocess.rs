@@ -8,31 +8,67 @@ use super::input::{self, Input};
 use super::progress::Terminal;
 use crate::build::{self, Output, PreprocessOptions};
 use crate::error::{Error, ErrorKind};
-use crate::light::LightOptions;
+use crate::light::{self, LightOptions, Sun};
 use crate::progress::Progress;
 
 /// Runs the command.
 pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
-    let source = match input::open(&args.input)? {
-        Input::Dem(source) => source,
-        Input::Terrain(file) => {
-            let what = "is a terrain file already";
-            let error = Error::new(ErrorKind::Unsupported, file.name(), what);
-            return Err(error.advice("name the DEM that it was made of").into());
-        }
-    };
+    let input = input::open(&args.input)?;
     let out = args
         .output
         .clone()
         .unwrap_or_else(|| input::beside(input::first(&args.input), ".terrain.exr"));
-    input::refuse_own(&args.input, &out)?;
+    let (grid, place, name) = match &input {
+        Input::Dem(source) => {
+            input::refuse_own(&args.input, &out)?;
+            let description = source.description();
+            (
+                description.grid,
+                description.place.clone(),
+                description.name.clone(),
+            )
+        }
+        Input::Terrain(file) => {
+            if args.filter.is_some() {
+                let what = "is a terrain file, whose filter is fixed";
+                let error = Error::new(ErrorKind::Misuse, file.name(), what);
+                return Err(error.advice("give --filter when it is made").into());
+            }
+            (
+                file.meta().grid,
+                file.meta().place.clone(),
+                file.name().to_string(),
+            )
+        }
+    };
+    let sun = match args.sun_at {
+        None => args.sun.unwrap_or_default(),
+        Some(moment) => {
+            let given = args.lat.zip(args.lon);
+            let found = || place.as_ref().and_then(|place| light::middle(&grid, place));
+            let Some((latitude_deg, longitude_deg)) =
+                given.or_else(|| found().map(|at| (at.latitude_deg, at.longitude_deg)))
+            else {
+                let what = "its reference system does not say where on the earth it lies";
+                let error = Error::new(ErrorKind::Misuse, name, what);
+                return Err(error.advice("give --lat and --lon").into());
+            };
+            let sun = Sun::at(moment, latitude_deg, longitude_deg)?;
+            terminal.note(&format!(
+                "the sun stands at azimuth {:.2}, altitude {:.2} degrees, seen from {latitude_deg:.4}, {longitude_deg:.4}",
+                sun.azimuth_deg, sun.altitude_deg
+            ));
+            sun
+        }
+    };
     let defaults = PreprocessOptions::default();
     let options = PreprocessOptions {
-        light: (!args.no_light).then(|| LightOptions {
-            sun: args.sun.unwrap_or_default(),
+        light: (!args.no_light).then_some(LightOptions {
+            sun,
             sky_directions: args.sky_directions,
         }),
-        filter: args.filter.into(),
+        curvature: args.curvature,
+        filter: args.filter.unwrap_or_default().into(),
         force: args.force,
         memory_bytes: args.memory.unwrap_or(defaults.memory_bytes),
         source: input::stamp(&args.input.inputs),
@@ -44,10 +80,15 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
         .as_deref()
         .map(|path| Output::create(path, args.force))
         .transpose()?;
-    for remark in source.remarks(terminal)? {
-        terminal.warn(&format!("{}: {remark}", source.description().name));
-    }
-    let report = build::preprocess(source.as_ref(), &out, &options, terminal)?;
+    let report = match &input {
+        Input::Dem(source) => {
+            for remark in source.remarks(terminal)? {
+                terminal.warn(&format!("{}: {remark}", source.description().name));
+            }
+            build::preprocess(source.as_ref(), &out, &options, terminal)?
+        }
+        Input::Terrain(file) => build::relight(file, &out, &options, terminal)?,
+    };
     if let (Some((output, mut file)), Some(path)) = (stats, &args.stats) {
         let line = serde_json::to_string(&report).expect("numbers are valid JSON") + "\n";
         file.write_all(line.as_bytes())

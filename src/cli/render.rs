@@ -18,11 +18,13 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::gpu;
 use crate::grid::Grid;
 use crate::levels::Levels;
+use crate::light::LightOptions;
 use crate::progress::Progress;
 use crate::render::{Headless, HeadlessOptions, Recording, picture};
+use crate::shade::ViewMode;
 use crate::source;
 use crate::stats::{FrameStats, PooledErrors, Run, SummaryStats};
-use crate::stream::{Terrain, TileOptions};
+use crate::stream::{AtOnce, CacheFolder, Flown, Terrain, TileOptions};
 
 /// Clip size where none is given and the camera is among the terrain.
 const CLIP_SIZE: i64 = 256;
@@ -70,12 +72,11 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
         .transpose()?;
     let gpu = gpu::open()?;
 
-    let terrain =
-        Terrain::open_with(&args.input.inputs, &args.input.read.options(), terminal)?.with_tiles(&tiles)?;
-    let terrain = Arc::new(terrain);
+    let folder = cache_folder(args)?;
+    let terrain = Arc::new(open(args, folder.clone(), &tiles, terminal)?);
     warn_of_sun(args, &terrain, terminal);
     let flight = flight.map(|flight| flight.over(&terrain)).transpose()?;
-    let camera = camera(args, &terrain)?;
+    let camera = camera(&args.camera, args.view.vertical_scale, &terrain)?;
     let scale = args.view.vertical_scale;
     let heights = height_range_m(terrain.as_ref())?.map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
     let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
@@ -115,6 +116,13 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
             )?]
         }
     };
+    if folder.is_some() {
+        // The next run opens what was begun; light takes longer than a picture is worth.
+        terrain.wait_for_heights(terminal)?;
+    }
+    for warning in terrain.take_warnings() {
+        terminal.warn(&warning);
+    }
     warn_of_promise(&frames, terminal);
     if frames.iter().all(|f| f.patches == 0) {
         terminal.warn(&format!("{}: no terrain is seen", terrain.name()));
@@ -130,13 +138,16 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
             flight_checksum: flight_json.as_ref().map(|(_, json)| checksum(json.as_bytes())),
             input_checksum: files_checksum(&source::files_of(&args.input.inputs)?)?,
             faults: faults.len() as u64,
+            fastest_fresh_m_s: fastest_fresh_m_s(&terrain, &headless, &clipmap, &shots),
             errors: pooled_errors(&headless, &frames),
         };
         write_stats(&file, path, &frames, run)?;
         output.publish(&file)?;
     }
     warn_of_faults(&faults, terminal);
-    if frames.iter().any(|f| !f.complete) {
+    if frames.iter().any(|f| f.provisional) {
+        terminal.warn("some frames are drafts: the terrain file was not built yet");
+    } else if frames.iter().any(|f| !f.complete) {
         terminal.warn("some frames were drawn before all of their data were there; see --wait");
     }
     let what = if frames.len() == 1 {
@@ -146,6 +157,59 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     };
     terminal.note(&format!("{} holds {what}", out.display()));
     Ok(())
+}
+
+/// The fastest flight at which every level would have stayed fresh, by what loading took.
+fn fastest_fresh_m_s(
+    terrain: &Terrain,
+    headless: &Headless,
+    clipmap: &ClipmapOptions,
+    shots: &Shots,
+) -> Option<f64> {
+    let Shots::Flight(flight) = shots else { return None };
+    let flown = Flown {
+        clip_size: clipmap.clip_size,
+        levels: headless.clipmap().windows().len() as u32,
+        upload_budget_bytes: clipmap.upload_budget_bytes,
+        fps: flight.fps(),
+    };
+    terrain.pace().map(|pace| pace.fastest_m_s(&flown))
+}
+
+/// Where terrain files are kept that are built in the background; none where nothing is built, or kept.
+fn cache_folder(args: &RenderArgs) -> Result<Option<CacheFolder>> {
+    if args.view.no_cache || !opens_at_once(args) {
+        return Ok(None);
+    }
+    CacheFolder::of_user()
+}
+
+/// Whether frames do not wait for a DEM's pyramid: what is measured must be whole.
+fn opens_at_once(args: &RenderArgs) -> bool {
+    let view = &args.view;
+    let whole = args.measure || view.view == ViewMode::Error || view.clip_size == Some(ClipSize::Auto);
+    view.wait == Wait::None && !whole
+}
+
+fn open(
+    args: &RenderArgs,
+    folder: Option<CacheFolder>,
+    tiles: &TileOptions,
+    terminal: &Terminal,
+) -> Result<Terrain> {
+    let (inputs, options) = (&args.input.inputs, args.input.read.options());
+    if !opens_at_once(args) {
+        return Terrain::open_with(inputs, &options, terminal)?.with_tiles(tiles);
+    }
+    let at_once = AtOnce {
+        folder,
+        light: LightOptions {
+            sun: args.view.sun.unwrap_or_default(),
+            ..Default::default()
+        },
+        tiles: *tiles,
+    };
+    Terrain::open_at_once(inputs, &options, &at_once, terminal)
 }
 
 /// The smallest clip size that keeps the promised error in all frames.
@@ -270,8 +334,8 @@ pub(super) fn read_flight(path: &Path) -> Result<(String, String)> {
 /// and the camera a distance D away, steps of `1.25 D / R` remain. They are to be about two pixels of the picture,
 /// `2 D tan(fov/2) / height` each, at the overview's 45 degrees: N = 1.5 times the picture's height.
 fn clip_size(args: &RenderArgs) -> i64 {
-    let whole = args.eye.is_none()
-        && args.eye_at.is_none()
+    let whole = args.camera.eye.is_none()
+        && args.camera.eye_at.is_none()
         && args.flight.as_deref().is_none_or(|f| f == Path::new("orbit"));
     match args.view.clip_size {
         Some(ClipSize::Fixed(asked)) => asked,
@@ -305,7 +369,7 @@ fn clipmap_options(args: &RenderArgs) -> Result<ClipmapOptions> {
     Ok(options)
 }
 
-fn tile_options(view: &ViewArgs) -> Result<TileOptions> {
+pub(super) fn tile_options(view: &ViewArgs) -> Result<TileOptions> {
     let defaults = TileOptions::default();
     let options = TileOptions {
         memory_bytes: view.memory.map_or(defaults.memory_bytes, |b| {
@@ -326,7 +390,8 @@ fn headless_options(view: &ViewArgs, terrain: &Terrain, clipmap: &ClipmapOptions
         view_mode: view.view,
         tint: !view.no_tint,
         haze: !view.no_haze,
-        traced_light: terrain.has_light(),
+        // Where there is none yet, it may come.
+        traced_light: true,
         sun,
         clipmap: *clipmap,
     }
@@ -345,7 +410,8 @@ fn check_heights(terrain: &Terrain, low: f64, high: f64) -> Result<()> {
 }
 
 fn warn_of_sun(args: &RenderArgs, terrain: &Terrain, terminal: &Terminal) {
-    if args.view.sun.is_some() && terrain.has_light() {
+    let other = |sun| args.view.sun.is_some_and(|asked| asked != sun);
+    if terrain.sun().is_some_and(other) {
         terminal.warn(&format!(
             "{}: its light is traced already, so --sun changes nothing; preprocess the DEM with --sun instead",
             terrain.name()

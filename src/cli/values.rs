@@ -5,7 +5,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 #[cfg(feature = "dem")]
 use crate::build::PartKind;
 use crate::grid::Rect;
-use crate::light::Sun;
+use crate::light::{Moment, Sun};
 use crate::pyramid::FilterKind;
 use crate::source::{Band, RawLayout, SampleType};
 
@@ -104,6 +104,31 @@ pub(super) fn sun(text: &str) -> Result<Sun, String> {
     sun.check()
         .map_err(|_| "the altitude is outside of -90 to 90 degrees".to_string())?;
     Ok(sun)
+}
+
+/// A moment, as in 2026-06-21T09:00:00Z.
+pub(super) fn moment(text: &str) -> Result<Moment, String> {
+    text.parse()
+}
+
+/// Degrees of latitude.
+pub(super) fn latitude(text: &str) -> Result<f64, String> {
+    let degrees = number(text)?;
+    if degrees.abs() <= 90.0 {
+        Ok(degrees)
+    } else {
+        Err("not between -90 and 90 degrees".into())
+    }
+}
+
+/// A coefficient of refraction.
+pub(super) fn refraction(text: &str) -> Result<f64, String> {
+    let k = number(text)?;
+    if (-1.0..1.0).contains(&k) {
+        Ok(k)
+    } else {
+        Err("not from -1 to below 1".into())
+    }
 }
 
 /// A filter by its name.

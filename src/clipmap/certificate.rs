@@ -41,6 +41,8 @@ pub enum Uncertified {
     CameraPlane,
     /// Bounds of what is drawn have not arrived.
     Missing,
+    /// What is drawn stands in for data that are not there yet.
+    Provisional,
 }
 
 impl Uncertified {
@@ -49,6 +51,7 @@ impl Uncertified {
         match self {
             Self::CameraPlane => "the error may reach the camera plane",
             Self::Missing => "bounds of what is drawn have not arrived",
+            Self::Provisional => "what is drawn is provisional",
         }
     }
 }
@@ -87,6 +90,12 @@ pub fn certify(clipmap: &Clipmap) -> Result<Certificate> {
 #[doc(hidden)]
 pub fn certify_by(clipmap: &Clipmap, terms: Terms) -> Result<Certificate> {
     let strays = strays(clipmap, terms)?;
+    if clipmap.report.provisional {
+        return Ok(Certificate {
+            error_px: Err(Uncertified::Provisional),
+            patch: None,
+        });
+    }
     let mut suspects: BinaryHeap<Suspect> = suspects(clipmap, &strays).collect();
     let mut certificate = Certificate {
         error_px: Ok(0.0),

@@ -88,6 +88,8 @@ pub struct UpdateReport {
     pub pops: u64,
     /// Whether coarser levels were left out by [`ClipmapOptions::levels`], so that the picture ends at a border.
     pub cut: bool,
+    /// Whether some of what is resident stands in for data that are not there yet.
+    pub provisional: bool,
 }
 
 /// The clipmap of one view.
@@ -99,10 +101,14 @@ pub struct Clipmap {
     vertical_scale: f64,
     cull: bool,
     max_error_px: Option<f64>,
+    levels_asked: Option<u32>,
     cut: bool,
     has_light: bool,
     range_m: [f32; 2],
     windows: Vec<Window>,
+    /// By level: the window that is to take a window's place, where the terrain has something better.
+    successors: Vec<Option<Window>>,
+    edition: u64,
     held: HeldField,
     wait: Wait,
     upload_budget_bytes: Option<u64>,
@@ -145,10 +151,13 @@ impl Clipmap {
             vertical_scale: options.vertical_scale,
             cull: options.cull,
             max_error_px: options.max_error_px,
+            levels_asked: options.levels,
             cut: count < fitting,
             has_light: levels.has_light(),
             range_m: height_range_m(levels)?,
             windows: (0..count).map(|l| Window::new(l, &grid, &ring)).collect(),
+            successors: vec![None; count as usize],
+            edition: levels.edition(),
             held: HeldField::new(count, ring.held_size()),
             wait: options.wait,
             upload_budget_bytes: options.upload_budget_bytes,
@@ -166,6 +175,30 @@ impl Clipmap {
             arrivals: Arrivals::default(),
             report: UpdateReport::default(),
         })
+    }
+
+    /// Takes over from `options` what can change without reading anything anew, from the next update on: transition,
+    /// vertical scale, culling, the promised error and the budget. False, and nothing changed, where they ask for another
+    /// clip size or other levels, for a promise where none was or none where one was, or for waiting where it did not or
+    /// the reverse: that takes a clipmap of its own.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] for options out of range.
+    pub fn adopt(&mut self, options: &ClipmapOptions) -> Result<bool> {
+        options.check()?;
+        let ring = options.ring()?;
+        let same = ring.clip_size == self.ring.clip_size
+            && options.max_error_px.is_some() == self.max_error_px.is_some()
+            && options.wait == self.wait
+            && options.levels == self.levels_asked;
+        if same {
+            self.ring = ring;
+            self.vertical_scale = options.vertical_scale;
+            self.cull = options.cull;
+            self.max_error_px = options.max_error_px;
+            self.upload_budget_bytes = options.upload_budget_bytes;
+        }
+        Ok(same)
     }
 
     /// Moves the windows to where the view's eye is, reading what that exposes, and selects what to draw.
@@ -190,12 +223,16 @@ impl Clipmap {
         let eye = Eye::new(view.eye, &self.grid);
         self.eye = None; // until all is done, there is no frame
         self.generation += 1;
+        self.meet_edition(levels);
         self.plan.begin(&self.windows, &eye);
         let mut exposed = 0;
         for plan in self.plan.levels() {
             let light_size = self.grid.level(light_level(plan.level));
             exposed += exposed_bytes(plan.level, plan.from, plan.to, light_size);
             self.windows[plan.level as usize].move_to(plan.to);
+            if let Some(successor) = &mut self.successors[plan.level as usize] {
+                successor.move_to(plan.to);
+            }
         }
         let fades = self.read_and_fade(levels, &eye, time_s)?;
         let ground = Ground {
@@ -244,17 +281,11 @@ impl Clipmap {
         });
         self.eye = Some(eye);
         self.screen = Some(screen);
-        // A level shows nothing, late or not, where the camera has climbed beyond its reach. That is judged from the
-        // highest ground that there may be: the ground that its climb is measured from may itself be late.
-        let over_all_m = eye.height_m - f64::from(self.range_m[1]);
-        let mean_spacing_m = (self.grid.spacing_m[0] * self.grid.spacing_m[1]).sqrt();
-        let shown = (0..self.windows.len() - 1).filter(|level| {
-            let step_m = mean_spacing_m * (1i64 << level) as f64;
-            1.25 * over_all_m / step_m < self.ring.reach() as f64
-        });
+        let shown = self.finest_shown(&eye)..self.windows.len() - 1;
         let stale_levels = shown.clone().filter(|l| fades.held[*l]).count() as u32;
         let pops = shown.map(|l| fades.pops[l]).sum();
         let coarsest_there = self.windows[self.windows.len() - 1].missing().next().is_none();
+        let provisional = self.windows.iter().any(Window::is_provisional);
         self.report = UpdateReport {
             uploads: self.plan.uploads() as u64,
             upload_bytes: self.plan.bytes(),
@@ -263,12 +294,46 @@ impl Clipmap {
             patches_culled: self.selection.culled,
             triangles: self.selection.triangles(),
             levels_drawn: self.selection.levels.count_ones(),
-            complete: stale_levels == 0 && coarsest_there,
+            complete: stale_levels == 0 && coarsest_there && !provisional,
             stale_levels,
             pops,
             cut: self.cut,
+            provisional,
         };
         Ok(&self.report)
+    }
+
+    /// The finest level that can show anything. A level shows nothing, late or not, where the camera has climbed beyond its
+    /// reach. That is judged from the highest ground that there may be: the ground that its climb is measured from may
+    /// itself be late.
+    fn finest_shown(&self, eye: &Eye) -> usize {
+        let over_all_m = eye.height_m - f64::from(self.range_m[1]);
+        let mean_spacing_m = (self.grid.spacing_m[0] * self.grid.spacing_m[1]).sqrt();
+        let coarsest = self.windows.len() - 1;
+        let shows = |level: &usize| {
+            let step_m = mean_spacing_m * (1i64 << level) as f64;
+            1.25 * over_all_m / step_m < self.ring.reach() as f64
+        };
+        (0..coarsest).find(shows).unwrap_or(coarsest)
+    }
+
+    /// Where the terrain has something better than what was read so far, all of that is to be read anew.
+    fn meet_edition(&mut self, levels: &dyn Levels) {
+        let edition = levels.edition();
+        if edition == self.edition {
+            return;
+        }
+        self.edition = edition;
+        for (window, successor) in self.windows.iter_mut().zip(&mut self.successors) {
+            let fresh = Window::new(window.level(), &self.grid, &self.ring);
+            match self.wait {
+                Wait::All => *window = fresh,
+                Wait::None => *successor = Some(fresh),
+            }
+        }
+        if self.wait == Wait::All {
+            self.has_light = levels.has_light();
+        }
     }
 
     /// Reads what the windows miss, and holds back what has not arrived.
@@ -277,6 +342,7 @@ impl Clipmap {
         let last_eye = self.last_eye.unwrap_or(samples);
         let passed_s = self.last_time_s.map_or(0.0, |last| (time_s - last).max(0.0));
         (self.last_eye, self.last_time_s) = (Some(samples), Some(time_s));
+        let finest_shown = self.finest_shown(eye);
         let (windows, plan, scratch) = (&mut self.windows, &mut self.plan, &mut self.scratch);
         if self.wait == Wait::All {
             self.arrivals.all(levels, windows, plan, scratch)?;
@@ -286,9 +352,19 @@ impl Clipmap {
         let course = Course {
             eye,
             ahead: eye.ahead(last_eye, passed_s, AHEAD_S),
+            finest_shown,
         };
+        let successors = &mut self.successors;
         self.arrivals
-            .some(levels, windows, plan, scratch, &course, budget)?;
+            .some(levels, windows, successors, plan, scratch, &course, budget)?;
+        if successors.iter().any(Option::is_some) {
+            self.arrivals
+                .succeed(levels, windows, successors, plan, scratch, eye)?;
+            if successors.iter().all(Option::is_none) {
+                self.has_light = levels.has_light();
+                self.range_m = range_of(&windows[windows.len() - 1]).unwrap_or(self.range_m);
+            }
+        }
         let moment = Moment {
             grid: &self.grid,
             eye,
@@ -419,6 +495,15 @@ impl Clipmap {
 /// That a clipmap has no frame to speak of.
 fn no_frame(what: &str) -> Error {
     Error::new(ErrorKind::Misuse, "clipmap", format!("there is no frame {what}")).advice("update it first")
+}
+
+/// The same of what a window knows, where that is anything.
+fn range_of(window: &Window) -> Option<[f32; 2]> {
+    let patches = window.known_patches();
+    let (low, high) = patches.fold((f32::NAN, f32::NAN), |(low, high), p| {
+        (low.min(p.bounds.need_min), high.max(p.bounds.need_max))
+    });
+    (low <= high).then_some([low, high])
 }
 
 /// The least and greatest height of a DEM in metres above its base, from the saturated bounds of its coarsest level, which

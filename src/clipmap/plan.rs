@@ -22,6 +22,19 @@ pub struct LevelPlan {
     pub light: Vec<Rect>,
 }
 
+impl LevelPlan {
+    /// An empty plan for `level`.
+    pub(super) fn new(level: u32) -> Self {
+        Self {
+            level,
+            from: Rect::EMPTY,
+            to: Rect::EMPTY,
+            heights: Vec::new(),
+            light: Vec::new(),
+        }
+    }
+}
+
 /// What all windows gain in an update, coarse levels first.
 #[derive(Clone, Debug, Default)]
 pub struct UpdatePlan {

@@ -40,6 +40,7 @@ pub struct Window {
     patch_slots: i64,
     patch_resident: Rect,
     patches: Vec<Option<PatchInfo>>,
+    provisional: bool,
     pub(super) missing: Missing,
 }
 
@@ -63,6 +64,7 @@ impl Window {
             patch_slots,
             patch_resident: Rect::EMPTY,
             patches: vec![None; (patch_slots * patch_slots) as usize],
+            provisional: false,
             missing: Missing::default(),
         }
     }
@@ -80,6 +82,11 @@ impl Window {
     /// The light texels over the same ground, in samples of the level whose light this one holds.
     pub fn light_resident(&self) -> Rect {
         self.light_of(self.resident)
+    }
+
+    /// Whether some of it stands in for data that were not there.
+    pub fn is_provisional(&self) -> bool {
+        self.provisional
     }
 
     /// The samples that have not arrived, as disjoint rectangles. Their light has not arrived either.
@@ -182,6 +189,12 @@ impl Window {
         self.patches[self.patch_index(a, b)].as_ref()
     }
 
+    /// What is known of all its patches.
+    pub(super) fn known_patches(&self) -> impl Iterator<Item = &PatchInfo> {
+        let patches = self.patch_resident.cells();
+        patches.filter_map(|(a, b)| self.patch(a, b))
+    }
+
     /// Whether all samples of patch (a, b) that the window is for have arrived.
     pub(super) fn has_all_of(&self, a: i64, b: i64) -> bool {
         let samples = Patch::new(self.level, a, b).samples_within(self.size);
@@ -246,7 +259,7 @@ impl Window {
     ) -> Result<Arrival> {
         let patches = rect.touching_patches(self.size).intersection(self.patch_resident);
         let unknown = |(a, b)| self.patches[self.patch_index(a, b)].is_none();
-        let wants_bounds = patches.cells().any(unknown);
+        let wants_bounds = self.provisional || patches.cells().any(unknown);
         if wants_bounds {
             scratch.bounds.resize(patches.area() as usize, Bounds::VOID);
             if source.bounds(self.level, patches, &mut scratch.bounds)? == Arrival::Missing {
@@ -294,6 +307,7 @@ impl Window {
             };
             self.note_patch(a, b, bounds);
         }
+        self.provisional |= source.is_provisional();
         written.heights.extend(self.pieces(rect));
         written.light.extend(self.light_pieces(light));
         Ok(Arrival::Arrived)
@@ -310,7 +324,12 @@ impl Window {
             .any(|(i, j)| self.heights[self.index(i, j)].is_nan());
         let index = self.patch_index(a, b);
         let known = self.patches[index].map(|p| p.bounds);
-        self.patches[index] = known.or(bounds).map(|bounds| PatchInfo { bounds, voids });
+        let bounds = match (known, bounds) {
+            // What stood in for these data is still drawn beside them.
+            (Some(known), Some(bounds)) if self.provisional => Some(both(&known, &bounds)),
+            _ => known.or(bounds),
+        };
+        self.patches[index] = bounds.map(|bounds| PatchInfo { bounds, voids });
     }
 
     fn index(&self, i: i64, j: i64) -> usize {
@@ -320,6 +339,18 @@ impl Window {
 
     fn patch_index(&self, a: i64, b: i64) -> usize {
         (slot(b, self.patch_slots) * self.patch_slots + slot(a, self.patch_slots)) as usize
+    }
+}
+
+/// Bounds of a patch that holds samples of both.
+fn both(a: &Bounds, b: &Bounds) -> Bounds {
+    Bounds {
+        min: a.min.min(b.min),
+        max: a.max.max(b.max),
+        error: a.error.max(b.error),
+        need_min: a.need_min.min(b.need_min),
+        need_max: a.need_max.max(b.need_max),
+        need_error: a.need_error.max(b.need_error),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::earth::Earth;
 use super::rays::Rays;
 use super::relief::{LANES, Relief};
 use super::{BAND, check, misuse};
@@ -29,6 +30,22 @@ pub fn horizon_tangents(
     work: &dyn Work,
     progress: &dyn Progress,
 ) -> Result<Vec<f32>> {
+    horizon_tangents_on(heights, grid, &Earth::default(), azimuth_deg, work, progress)
+}
+
+/// The same over `earth`: what lies at distance t stands `t^2 / 2R` lower, R its radius. Between two crossings of
+/// edges a step s apart the horizon of a curved earth may stand higher than what is found, by at most `s / 2R`.
+///
+/// # Errors
+/// Those of [`horizon_tangents`].
+pub fn horizon_tangents_on(
+    heights: &[f32],
+    grid: &Grid,
+    earth: &Earth,
+    azimuth_deg: f64,
+    work: &dyn Work,
+    progress: &dyn Progress,
+) -> Result<Vec<f32>> {
     check(grid, heights.len())?;
     if !azimuth_deg.is_finite() {
         return Err(misuse(format!(
@@ -36,8 +53,8 @@ pub fn horizon_tangents(
         )));
     }
     progress.begin("horizon", grid.size.height as u64);
-    let relief = Relief::new(heights, grid);
-    let rays = Rays::new(grid, azimuth_deg, f64::INFINITY, 0.0);
+    let relief = Relief::new(heights, grid, work);
+    let rays = Rays::new(grid, earth.on_grid_deg(azimuth_deg), earth.radius_m, 0.0);
     let mut tangents = vec![0.0; heights.len()];
     each_lanes(
         &mut tangents,

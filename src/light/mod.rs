@@ -4,8 +4,11 @@
 //! spreads it under voids, and [`light_levels`] filters it into levels like the heights. All of it is traced
 //! over `S0`, level 0; no data, and what lies beyond the DEM, neither casts a shadow nor blocks the sky.
 //!
-//! Azimuths are degrees clockwise from true north, which is taken to be grid north. Heights are metres less
-//! [`Grid::base_m`], row by row, finite or NaN for no data.
+//! Azimuths are degrees clockwise from true north; [`Earth`] says where the grid's north is, and how the ground curves.
+//! [`Sun::at`] is the sun of a time and place. Heights are metres less [`Grid::base_m`], row by row, finite or NaN for no
+//! data.
+
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use half::f16;
 
@@ -16,6 +19,7 @@ use crate::progress::Progress;
 use crate::pyramid::{Filter, downsample};
 use crate::work::{Work, each_chunk};
 
+mod earth;
 mod fill;
 mod horizon;
 mod normal;
@@ -23,11 +27,14 @@ mod rays;
 mod relief;
 mod sky;
 mod sun;
+mod sun_at;
 
+pub use earth::{DEFAULT_REFRACTION, Earth, middle};
 pub use fill::fill_voids;
-pub use horizon::horizon_tangents;
-pub use sky::sky_share;
-pub use sun::{DISC_DEG, Sun, disc_share, sun_share};
+pub use horizon::{horizon_tangents, horizon_tangents_on};
+pub use sky::{sky_share, sky_share_on};
+pub use sun::{DISC_DEG, Sun, disc_share, sun_share, sun_share_on};
+pub use sun_at::Moment;
 
 /// Sky directions unless others are asked for.
 pub const DEFAULT_SKY_DIRECTIONS: u32 = 16;
@@ -70,7 +77,7 @@ fn check(grid: &Grid, samples: usize) -> Result<()> {
     Err(misuse(format!("{samples} samples given for {width} x {height}")))
 }
 
-/// Traces the light of level 0 and filters it into all of [`Grid::file_levels`].
+/// Traces the light of level 0 on a flat earth and filters it into all of [`Grid::file_levels`].
 ///
 /// # Errors
 /// [`ErrorKind::Misuse`] where the grid or the sun is impossible or `heights` has another length;
@@ -112,15 +119,18 @@ pub fn light_levels(
         (1..count).map(|l| 2 * grid.level(l).samples() as u64).sum(),
     );
     let filled = |mut share: Vec<f32>| {
-        share
-            .iter_mut()
-            .zip(heights)
-            .filter(|(_, h)| h.is_nan())
-            .for_each(|(s, _)| *s = f32::NAN);
-        if share.iter().any(|s| s.is_nan()) {
+        let voids = AtomicBool::new(false);
+        each_chunk(work, &mut share, CHUNK, |chunk, share| {
+            let mut any = false;
+            for (s, h) in share.iter_mut().zip(&heights[chunk * CHUNK..]) {
+                *s = if h.is_nan() { f32::NAN } else { s.clamp(0.0, 1.0) };
+                any |= s.is_nan();
+            }
+            voids.fetch_or(any, Ordering::Relaxed);
+        });
+        if voids.into_inner() {
             fill_voids(&mut share, grid.size);
         }
-        share.iter_mut().for_each(|s| *s = s.clamp(0.0, 1.0));
         share
     };
     let (mut sun, mut sky) = (filled(sun), filled(sky));

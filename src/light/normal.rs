@@ -21,29 +21,34 @@ impl<'a> Slopes<'a> {
         }
     }
 
-    /// By how much the ground rises a metre eastward and southward at each of at most [`LANES`] samples from (i, j)
-    /// eastward: central differences, one-sided at the DEM's edges and beside voids, level along an axis without a
-    /// valid neighbour. NaN at voids.
-    pub(super) fn rises(&self, [i, j]: [usize; 2], east: &mut [f32], south: &mut [f32]) {
+    /// By how much the ground rises a metre eastward and southward at each of `count`, at most [`LANES`], samples from
+    /// (i, j) eastward: central differences, one-sided at the DEM's edges and beside voids, level along an axis without
+    /// a valid neighbour. NaN at voids; 0 beyond `count`.
+    pub(super) fn rises(&self, [i, j]: [usize; 2], count: usize) -> [[f32; LANES]; 2] {
         let (width, height) = (self.grid.size.width as usize, self.grid.size.height as usize);
-        let (at, count) = (j * width + i, east.len());
-        if i > 0 && i + count < width && j > 0 && j + 1 < height {
-            let row = &self.heights[at - 1..at + count + 1];
-            let (north, below) = (&self.heights[at - width..], &self.heights[at + width..]);
-            for l in 0..count {
-                let whole = row[l + 1] - row[l + 1];
-                east[l] = (row[l + 2] - row[l]) * self.per_two_m[0] + whole;
-                south[l] = (below[l] - north[l]) * self.per_two_m[1] + whole;
+        let at = j * width + i;
+        let [mut east, mut south] = [[0.0; LANES]; 2];
+        let mut whole = count == LANES && i > 0 && i + LANES < width && j > 0 && j + 1 < height;
+        if whole {
+            let lanes = |at: usize| -> &[f32; LANES] {
+                self.heights[at..at + LANES]
+                    .try_into()
+                    .expect("the range is as long")
+            };
+            let (here, west, east_of) = (lanes(at), lanes(at - 1), lanes(at + 1));
+            let (north, south_of) = (lanes(at - width), lanes(at + width));
+            for l in 0..LANES {
+                east[l] = (east_of[l] - west[l]) * self.per_two_m[0];
+                south[l] = (south_of[l] - north[l]) * self.per_two_m[1];
             }
-        } else {
-            east.fill(f32::NAN);
-            south.fill(f32::NAN);
+            whole = (0..LANES).fold(true, |all, l| all & !(here[l] + east[l] + south[l]).is_nan());
         }
-        for l in 0..count {
-            if (east[l] + south[l]).is_nan() {
+        if !whole {
+            for l in 0..count {
                 [east[l], south[l]] = self.beside_gaps([i + l, j]);
             }
         }
+        [east, south]
     }
 
     /// Rises eastward and southward where neighbours may be missing.
@@ -80,16 +85,14 @@ impl<'a> Slopes<'a> {
         ]
     }
 
-    /// The cosines between `direction`, a unit vector of the world (x east, y up, z south), and the normals at
+    /// The cosines between `direction`, a unit vector of the world (x east, y up, z south), and the normals at `count`
     /// samples from (i, j) eastward; NaN at voids.
-    pub(super) fn cosines(&self, at: [usize; 2], direction: [f32; 3], cosines: &mut [f32]) {
-        let (mut east, mut south) = ([0.0; LANES], [0.0; LANES]);
-        let (east, south) = (&mut east[..cosines.len()], &mut south[..cosines.len()]);
-        self.rises(at, east, south);
-        for ((cosine, e), s) in cosines.iter_mut().zip(&*east).zip(&*south) {
-            let length = (1.0 + e * e + s * s).sqrt();
-            *cosine = (direction[1] - e * direction[0] - s * direction[2]) / length;
-        }
+    pub(super) fn cosines(&self, at: [usize; 2], count: usize, direction: [f32; 3]) -> [f32; LANES] {
+        let [east, south] = self.rises(at, count);
+        std::array::from_fn(|l| {
+            let (e, s) = (east[l], south[l]);
+            (direction[1] - e * direction[0] - s * direction[2]) / (1.0 + e * e + s * s).sqrt()
+        })
     }
 }
 
@@ -98,8 +101,7 @@ mod tests {
     use super::*;
 
     fn rise(heights: &[f32], grid: &Grid, i: usize, j: usize) -> [f32; 2] {
-        let (mut east, mut south) = ([0.0], [0.0]);
-        Slopes::new(heights, grid).rises([i, j], &mut east, &mut south);
+        let [east, south] = Slopes::new(heights, grid).rises([i, j], 1);
         [east[0], south[0]]
     }
 
@@ -132,14 +134,14 @@ mod tests {
         heights[3 * 30 + 11] = 5.0;
         let slopes = Slopes::new(&heights, &grid);
         for (i, j) in (0..30 - LANES).flat_map(|i| (0..7).map(move |j| (i, j))) {
-            let (mut east, mut south, mut cosines) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-            slopes.rises([i, j], &mut east, &mut south);
-            slopes.cosines([i, j], [0.6, 0.0, 0.8], &mut cosines);
+            let [east, south] = slopes.rises([i, j], LANES);
+            let cosines = slopes.cosines([i, j], LANES, [0.6, 0.0, 0.8]);
             for l in 0..LANES {
                 let [e, s] = rise(&heights, &grid, i + l, j);
                 assert_eq!([e, s].map(f32::to_bits), [east[l], south[l]].map(f32::to_bits));
                 let want = -(0.6 * e + 0.8 * s) / (1.0 + e * e + s * s).sqrt();
-                assert!(e.is_nan() == cosines[l].is_nan() && !((want - cosines[l]).abs() > 1e-6));
+                let off = (want - cosines[l]).abs();
+                assert!(if e.is_nan() { off.is_nan() } else { off <= 1e-6 });
             }
         }
     }

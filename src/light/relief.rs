@@ -14,12 +14,13 @@
 
 use super::rays::{Rays, SPANS};
 use crate::grid::Grid;
+use crate::work::{Work, each_chunk};
 
 /// Samples that are traced at once.
 pub(super) const LANES: usize = 8;
 
-/// Samples from one window of maxima to the next.
-const STEP: usize = 4;
+/// Samples from one window of maxima to the next, for each of [`SPANS`].
+const STEPS: [usize; SPANS.len()] = [64, 16, 4, 4];
 
 /// Heights and their greatest over windows.
 pub(super) struct Relief<'a> {
@@ -27,47 +28,53 @@ pub(super) struct Relief<'a> {
     pub(super) grid: &'a Grid,
     /// The greatest height; minus infinity where all is void.
     greatest: f32,
-    /// For each of [`SPANS`], the greatest height over the windows from each multiple of [`STEP`] that hold a run of
-    /// that span as [`LANES`] samples see it, row by row.
-    windows: [Vec<f32>; SPANS.len()],
-    windows_wide: usize,
+    windows: [Windows; SPANS.len()],
+}
+
+/// The greatest heights over windows from each multiple of a step that hold a run of a span as [`LANES`] samples see
+/// it, row by row.
+#[derive(Default)]
+struct Windows {
+    wide: usize,
+    highest: Vec<f32>,
 }
 
 impl<'a> Relief<'a> {
     /// The relief of `heights`, as many as `grid` has samples.
-    pub(super) fn new(heights: &'a [f32], grid: &'a Grid) -> Self {
+    pub(super) fn new(heights: &'a [f32], grid: &'a Grid, work: &dyn Work) -> Self {
         let width = grid.size.width as usize;
-        let wide = width.div_ceil(STEP);
-        let mut blocks = Vec::new();
-        for rows in heights.chunks(STEP * width) {
-            let mut highest = vec![f32::NEG_INFINITY; width];
-            for row in rows.chunks(width) {
-                highest
-                    .iter_mut()
-                    .zip(row)
-                    .for_each(|(most, &h)| *most = greater(*most, h));
+        let finest = STEPS[SPANS.len() - 1];
+        let wide = width.div_ceil(finest);
+        let mut blocks = vec![f32::NEG_INFINITY; wide * heights.len().div_ceil(finest * width)];
+        each_chunk(work, &mut blocks, wide, |z, blocks| {
+            let rows = heights[z * finest * width..].chunks(width).take(finest);
+            for row in rows {
+                for (block, part) in blocks.iter_mut().zip(row.chunks(finest)) {
+                    *block = part.iter().fold(*block, |most, &h| greater(most, h));
+                }
             }
-            blocks.extend(
-                highest
-                    .chunks(STEP)
-                    .map(|part| part.iter().fold(f32::NEG_INFINITY, |most, &h| greater(most, h))),
-            );
-        }
-        let greatest = blocks.iter().fold(f32::NEG_INFINITY, |most, &h| greater(most, h));
-        // A run's samples begin anywhere in a block.
-        let count = |samples: i64| (samples as usize + STEP - 1).div_ceil(STEP);
-        let windows = SPANS.map(|span| {
-            let high = count(span + 1);
-            let across = slide(&blocks, wide, count(span + LANES as i64));
-            slide(&transposed(&across, wide), blocks.len() / wide, high)
         });
-        let windows = windows.map(|w| transposed(&w, blocks.len() / wide));
+        let mut windows = <[Windows; SPANS.len()]>::default();
+        each_chunk(work, &mut windows, 1, |depth, windows| {
+            let step = STEPS[depth] / finest;
+            let (blocks, wide) = if step == 1 {
+                (blocks.clone(), wide)
+            } else {
+                (thinned(&blocks, wide, step), wide.div_ceil(step))
+            };
+            // A run's samples begin anywhere in a block.
+            let count = |samples: i64| (samples as usize + STEPS[depth] - 1).div_ceil(STEPS[depth]);
+            let across = slide(&blocks, wide, false, count(SPANS[depth] + LANES as i64));
+            windows[0] = Windows {
+                wide,
+                highest: slide(&across, wide, true, count(SPANS[depth] + 1)),
+            };
+        });
         Self {
             heights,
             grid,
-            greatest,
+            greatest: blocks.iter().fold(f32::NEG_INFINITY, |most, &h| greater(most, h)),
             windows,
-            windows_wide: wide,
         }
     }
 
@@ -130,10 +137,11 @@ impl<'a> Relief<'a> {
             if run.depth == 0 && !could_rise(self.greatest) {
                 break;
             }
-            let x = (i as i64 + i64::from(run.corner[0])).max(0) as usize / STEP;
-            let z = (j as i64 + i64::from(run.corner[1])).max(0) as usize / STEP;
             let depth = usize::from(run.depth);
-            if !could_rise(self.windows[depth][z * self.windows_wide + x]) {
+            let x = (i as i64 + i64::from(run.corner[0])).max(0) as usize / STEPS[depth];
+            let z = (j as i64 + i64::from(run.corner[1])).max(0) as usize / STEPS[depth];
+            let windows = &self.windows[depth];
+            if !could_rise(windows.highest[z * windows.wide + x]) {
                 at = run.next as usize;
                 continue;
             }
@@ -172,27 +180,71 @@ fn greater(most: f32, other: f32) -> f32 {
     if other > most { other } else { most }
 }
 
-/// The greatest of `count` values from each on, fewer at the end, in each row of `width`.
-fn slide(values: &[f32], width: usize, count: usize) -> Vec<f32> {
-    let mut out = values.to_vec();
-    for row in out.chunks_mut(width) {
-        // Windows of 1, 2, 4, ... values, then two of the largest that together are `count`.
-        let mut done = 1;
-        while done < count {
-            let by = done.min(count - done);
-            for at in 0..width.saturating_sub(by) {
-                row[at] = greater(row[at], row[at + by]);
-            }
-            done += by;
+/// The greatest of `step` x `step` values each.
+fn thinned(values: &[f32], width: usize, step: usize) -> Vec<f32> {
+    let mut out = Vec::with_capacity(width.div_ceil(step) * values.len().div_ceil(step * width));
+    for rows in values.chunks(step * width) {
+        for x in (0..width).step_by(step) {
+            let parts = rows.chunks(width).map(|row| &row[x..(x + step).min(width)]);
+            out.push(
+                parts
+                    .flatten()
+                    .fold(f32::NEG_INFINITY, |most, &h| greater(most, h)),
+            );
         }
     }
     out
 }
 
-/// Rows of `width` as columns.
-fn transposed(values: &[f32], width: usize) -> Vec<f32> {
-    let height = values.len() / width;
-    (0..values.len())
-        .map(|at| values[at % height * width + at / height])
-        .collect()
+/// The greatest of `count` values from each on, fewer at the end, down columns or along rows of `width`.
+fn slide(values: &[f32], width: usize, down: bool, count: usize) -> Vec<f32> {
+    let mut values = values.to_vec();
+    let (stride, length) = if down { (width, values.len()) } else { (1, width) };
+    for values in values.chunks_mut(length) {
+        // Windows of 1, 2, 4, ... values, then two of the largest that together are `count`.
+        let mut done = 1;
+        while done < count && done * stride < length {
+            let by = done.min(count - done);
+            // In pieces that do not reach into what they read: vectorised.
+            let mut at = 0;
+            while at + by * stride < length {
+                let (here, there) = values[at..].split_at_mut(by * stride);
+                here.iter_mut()
+                    .zip(&*there)
+                    .for_each(|(most, &h)| *most = greater(*most, h));
+                at += by * stride;
+            }
+            done += by;
+        }
+    }
+    values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pyramid::random::Random;
+
+    #[test]
+    fn windows_slide_over_all_that_they_hold() {
+        let mut random = Random::new(5);
+        for _ in 0..200 {
+            let (width, height) = (1 + random.below(40) as usize, 1 + random.below(30) as usize);
+            let (count, down) = (1 + random.below(20) as usize, random.unit() < 0.5);
+            let values = random.heights((width * height) as i64, -1.0, 1.0, 0.0);
+            let got = slide(&values, width, down, count);
+            for (at, &got) in got.iter().enumerate() {
+                let (x, z) = (at % width, at / width);
+                let held = (0..count).filter_map(|k| {
+                    let (x, z) = if down { (x, z + k) } else { (x + k, z) };
+                    (x < width && z < height).then(|| values[z * width + x])
+                });
+                assert_eq!(
+                    got,
+                    held.fold(f32::NEG_INFINITY, f32::max),
+                    "{width} x {height}, {count}"
+                );
+            }
+        }
+    }
 }

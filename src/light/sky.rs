@@ -1,6 +1,7 @@
 //! The sky's share: how much of the sky dome a sample sees, weighted by the cosine to its normal.
 
 use super::check;
+use super::earth::Earth;
 use super::horizon::each_lanes;
 use super::normal::Slopes;
 use super::rays::{Rays, direction};
@@ -42,22 +43,36 @@ pub fn sky_share(
     work: &dyn Work,
     progress: &dyn Progress,
 ) -> Result<Vec<f32>> {
+    sky_share_on(heights, grid, &Earth::default(), directions, work, progress)
+}
+
+/// The same over `earth`, with the azimuths spread from grid north; see [`super::horizon_tangents_on`].
+///
+/// # Errors
+/// Those of [`sky_share`].
+pub fn sky_share_on(
+    heights: &[f32],
+    grid: &Grid,
+    earth: &Earth,
+    directions: u32,
+    work: &dyn Work,
+    progress: &dyn Progress,
+) -> Result<Vec<f32>> {
     check(grid, heights.len())?;
     progress.begin("sky", u64::from(directions) * grid.size.height as u64);
     if directions == 0 {
         return Ok(vec![1.0; heights.len()]);
     }
-    let relief = Relief::new(heights, grid);
+    let relief = Relief::new(heights, grid, work);
     let slopes = Slopes::new(heights, grid);
     let mut shares = vec![0.0; heights.len()];
     for k in 0..directions {
         let azimuth_deg = f64::from(k) * 360.0 / f64::from(directions);
-        let rays = Rays::new(grid, azimuth_deg, f64::INFINITY, SLACK);
+        let rays = Rays::new(grid, azimuth_deg, earth.radius_m, SLACK);
         let [east, south] = direction(azimuth_deg).map(|c| c as f32);
         each_lanes(&mut shares, grid, "sky", work, progress, |[i, j], sums| {
             let count = sums.len();
-            let (mut e, mut s) = ([0.0; LANES], [0.0; LANES]);
-            slopes.rises([i, j], &mut e[..count], &mut s[..count]);
+            let [e, s] = slopes.rises([i, j], count);
             let (mut up, mut lean) = ([0.0; LANES], [0.0; LANES]);
             let mut tangents = [0.0; LANES];
             for l in 0..LANES {

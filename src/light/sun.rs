@@ -1,9 +1,10 @@
 //! The sun's share: how much of its disc stands over the horizon, times the cosine of its incidence.
 
+use super::earth::Earth;
 use super::horizon::each_lanes;
 use super::normal::Slopes;
 use super::rays::{Rays, direction};
-use super::relief::{LANES, Relief};
+use super::relief::Relief;
 use super::{check, misuse};
 use crate::error::Result;
 use crate::grid::Grid;
@@ -86,14 +87,33 @@ pub fn sun_share(
     work: &dyn Work,
     progress: &dyn Progress,
 ) -> Result<Vec<f32>> {
+    sun_share_on(heights, grid, &Earth::default(), sun, work, progress)
+}
+
+/// The same over `earth`: the sun's azimuth is turned to its grid, and it curves; see [`super::horizon_tangents_on`].
+///
+/// # Errors
+/// Those of [`sun_share`].
+pub fn sun_share_on(
+    heights: &[f32],
+    grid: &Grid,
+    earth: &Earth,
+    sun: Sun,
+    work: &dyn Work,
+    progress: &dyn Progress,
+) -> Result<Vec<f32>> {
     check(grid, heights.len())?;
     sun.check()?;
+    let sun = Sun {
+        azimuth_deg: earth.on_grid_deg(sun.azimuth_deg),
+        ..sun
+    };
     progress.begin("sun", grid.size.height as u64);
     let mut shares = vec![0.0; heights.len()];
     let altitude = sun.altitude_deg.to_radians();
     let radius = (DISC_DEG / 2.0).to_radians();
-    let relief = Relief::new(heights, grid);
-    let rays = Rays::new(grid, sun.azimuth_deg, f64::INFINITY, 0.0);
+    let relief = Relief::new(heights, grid, work);
+    let rays = Rays::new(grid, sun.azimuth_deg, earth.radius_m, 0.0);
     let slopes = Slopes::new(heights, grid);
     let to_sun = sun.direction().map(|c| c as f32);
     // Horizons below the disc hide nothing, those above it all. Beyond a right angle tangents turn negative.
@@ -103,20 +123,16 @@ pub fn sun_share(
     } else {
         f32::INFINITY
     };
-    let sets = altitude <= -radius;
+    // Of a sun that has set nothing is left, not even over flat ground.
+    let from = if altitude <= -radius { f32::INFINITY } else { from };
     let lowest = disc_share(f64::from(from).atan(), altitude) as f32;
     each_lanes(&mut shares, grid, "sun", work, progress, |[i, j], shares| {
-        let (mut cosines, mut tangents) = ([0.0; LANES], [f32::INFINITY; LANES]);
-        let (cosines, tangents) = (&mut cosines[..shares.len()], &mut tangents[..shares.len()]);
-        slopes.cosines([i, j], to_sun, cosines);
-        for (tangent, &cosine) in tangents.iter_mut().zip(&*cosines) {
-            // What turns away from the sun needs no ray.
-            if cosine > 0.0 && !sets {
-                *tangent = from;
-            }
-        }
-        relief.raise(&rays, [i, j], until, tangents);
-        for ((share, &cosine), &tangent) in shares.iter_mut().zip(&*cosines).zip(&*tangents) {
+        let count = shares.len();
+        let cosines = slopes.cosines([i, j], count, to_sun);
+        // What turns away from the sun needs no ray.
+        let mut tangents = cosines.map(|cosine| if cosine > 0.0 { from } else { f32::INFINITY });
+        relief.raise(&rays, [i, j], until, &mut tangents[..count]);
+        for ((share, cosine), tangent) in shares.iter_mut().zip(cosines).zip(tangents) {
             *share = if cosine.is_nan() {
                 f32::NAN
             } else if tangent == f32::INFINITY {

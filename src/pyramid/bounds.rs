@@ -40,6 +40,8 @@ use crate::levels::Bounds;
 use crate::progress::Progress;
 use crate::work::{Work, each_chunk};
 
+pub(super) mod block;
+pub(super) mod rows;
 #[cfg(test)]
 mod tests;
 
@@ -82,7 +84,8 @@ pub(super) fn bound_level(
             let patch = Patch::new(level, a as i64, b as i64);
             *bounds = scene.own(patch);
             if let Some(finer) = finer {
-                saturate(patch, bounds, finer, grid.patches(level - 1));
+                let size = grid.patches(level - 1);
+                saturate(patch, bounds, size, |x, z| finer[(z * size.width + x) as usize]);
             }
         }
         progress.advance(row.len() as u64);
@@ -105,11 +108,11 @@ fn round_up(x: f64) -> f32 {
 }
 
 /// Widens the `need_*` of `patch` by those of its children and their neighbours.
-fn saturate(patch: Patch, bounds: &mut Bounds, finer: &[Bounds], finer_patches: Size) {
+fn saturate(patch: Patch, bounds: &mut Bounds, finer_patches: Size, finer: impl Fn(i64, i64) -> Bounds) {
     let (a, b) = (2 * patch.a, 2 * patch.b);
     let around = Rect::new(a - 1, b - 1, a + 3, b + 3).intersection(finer_patches.rect());
     for (x, z) in around.cells() {
-        let below = finer[(z * finer_patches.width + x) as usize];
+        let below = finer(x, z);
         // f32's min and max take the other value where one is NaN.
         bounds.need_min = bounds.need_min.min(below.need_min);
         bounds.need_max = bounds.need_max.max(below.need_max);
@@ -166,6 +169,8 @@ impl Scene<'_> {
         if min.is_nan() {
             return Bounds::VOID;
         }
+        // Which of 0 and -0 is the less depends on the order in which they are met: always 0.
+        let (min, max) = (min + 0.0, max + 0.0);
         let error = if self.level == 0 { 0.0 } else { self.error(patch) };
         Bounds {
             min,

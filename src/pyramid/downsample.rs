@@ -212,7 +212,7 @@ fn filter_row(fine: &[f32], filter: &Filter, scratch: &mut RowScratch, out: &mut
 }
 
 /// The sums of a block: centres, and for each pair of taps the samples on either side.
-fn weigh<'a>(
+pub(super) fn weigh<'a>(
     filter: &Filter,
     centre: &[f64],
     taps: impl Iterator<Item = (&'a [f64], &'a [f64])> + Clone,
@@ -264,7 +264,7 @@ fn clamp<'a>(centre: &[f64], taps: impl Iterator<Item = (&'a [f64], &'a [f64])>,
 
 /// The sample one past the end: the row's last, `next`, and last but one, `before`, in a straight line.
 /// Void where the last fine sample is, and equal to it where either of the two is void.
-fn continued(next: f64, before: f64, last: f64) -> f64 {
+pub(super) fn continued(next: f64, before: f64, last: f64) -> f64 {
     let line = 2.0 * next - before;
     if last.is_nan() || line.is_nan() {
         last
@@ -274,10 +274,19 @@ fn continued(next: f64, before: f64, last: f64) -> f64 {
 }
 
 /// The one rounding.
-fn stored(height: f64, rounding_m: Option<f64>) -> f32 {
+pub(super) fn stored(height: f64, rounding_m: Option<f64>) -> f32 {
     let height = match rounding_m {
-        Some(step) => (height / step).round_ties_even() * step,
+        Some(step) => round_ties_even(height / step) * step,
         None => height,
     };
     height.clamp(-GREATEST, GREATEST) as f32
+}
+
+/// `f64::round_ties_even` in plain arithmetic, which unlike it becomes wide instructions on every processor: above
+/// 2^52 there are no fractions, and adding 2^52 to what is smaller rounds them away.
+fn round_ties_even(x: f64) -> f64 {
+    const WHOLE: f64 = (1u64 << 52) as f64;
+    let size = x.abs();
+    let rounded = (size + WHOLE) - WHOLE;
+    (if size < WHOLE { rounded } else { size }).copysign(x)
 }

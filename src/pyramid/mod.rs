@@ -13,14 +13,18 @@ use crate::work::Work;
 mod bounds;
 mod downsample;
 mod filter;
+mod halving;
 #[cfg(test)]
 pub(crate) mod random;
 #[cfg(test)]
 mod tests;
 
 pub use bounds::SATURATION;
+pub use bounds::block::{Rows, Share, measure};
+pub use bounds::rows::BoundsRows;
 pub use downsample::{downsample, rounding_step};
 pub use filter::{DEFAULT_LOBES, Filter, FilterKind, MAX_LOBES};
+pub use halving::Halving;
 
 /// All levels of a DEM in memory: heights, and once they are made bounds and light.
 pub struct Pyramid {
@@ -74,10 +78,7 @@ impl Pyramid {
         };
         let mut heights = heights;
         for h in &mut heights {
-            // The least f32 stands for no data on the GPU, and no ground is that deep.
-            if h.is_infinite() || *h == f32::MIN {
-                *h = f32::NAN;
-            }
+            *h = valid(*h);
         }
         let count = grid.file_levels();
         progress.begin(
@@ -177,11 +178,39 @@ impl Pyramid {
     }
 }
 
+/// A height as it is stored: infinities are no data, and so is the least f32, which stands for no data on the GPU, and
+/// no ground is that deep.
+pub(crate) fn valid(height: f32) -> f32 {
+    if height.is_infinite() || height == f32::MIN {
+        f32::NAN
+    } else {
+        height
+    }
+}
+
 /// The least and greatest valid sample; NaN where there is none.
-fn range(samples: &[f32]) -> (f32, f32) {
-    samples
-        .iter()
-        .fold((f32::NAN, f32::NAN), |(low, high), &h| (low.min(h), high.max(h)))
+pub(crate) fn range(samples: &[f32]) -> (f32, f32) {
+    const LANES: usize = 8;
+    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    let mut widen = |part: &[f32]| {
+        for ((low, high), &h) in low.iter_mut().zip(&mut high).zip(part) {
+            // No comparison with NaN holds.
+            *low = if h < *low { h } else { *low };
+            *high = if h > *high { h } else { *high };
+        }
+    };
+    let parts = samples.chunks_exact(LANES);
+    widen(parts.remainder());
+    parts.for_each(widen);
+    let (low, high) = (
+        low.into_iter().fold(f32::INFINITY, f32::min),
+        high.into_iter().fold(f32::NEG_INFINITY, f32::max),
+    );
+    if low > high {
+        (f32::NAN, f32::NAN)
+    } else {
+        (low, high)
+    }
 }
 
 fn overshoot(levels: &[Vec<f32>]) -> f32 {
@@ -189,7 +218,12 @@ fn overshoot(levels: &[Vec<f32>]) -> f32 {
     levels[1..]
         .iter()
         .map(|level| range(level))
-        .fold(0.0, |most: f32, (l, h)| most.max(low - l).max(h - high))
+        .fold(0.0, |most, range| most.max(excess((low, high), range)))
+}
+
+/// The most by which a range leaves that of level 0; 0 where either is of no sample.
+pub(crate) fn excess((low, high): (f32, f32), (l, h): (f32, f32)) -> f32 {
+    0f32.max(low - l).max(h - high)
 }
 
 /// Copies `rect` of a grid of `size` elements out of `data`.

@@ -119,15 +119,7 @@ impl Headless {
     pub fn new(gpu: Gpu, levels: &dyn Levels, options: &HeadlessOptions) -> Result<Self> {
         check_picture(options.size_px)?;
         let clipmap = Clipmap::new(levels, &options.clipmap)?;
-        let renderer_options = RendererOptions {
-            colour_format: COLOUR_FORMAT,
-            sample_count: options.sample_count,
-            view_mode: options.view_mode,
-            traced_light: options.traced_light && clipmap.has_light(),
-            tint: options.tint,
-            haze: options.haze,
-            ..Default::default()
-        };
+        let renderer_options = renderer_options(options, clipmap.has_light());
         let renderer = ClipmapRenderer::new(&gpu.device, &renderer_options)?;
         let textures = renderer.textures(&gpu.device, &clipmap, options.sun)?;
         Ok(Self {
@@ -171,6 +163,7 @@ impl Headless {
             return Err(Error::new(ErrorKind::Misuse, "view", what).advice(format!("frames are of {w}x{h}")));
         }
         let update = *self.clipmap.update(levels, view, time_s)?;
+        self.follow_light()?;
         let planned = Instant::now();
         let certificate = certify(&self.clipmap)?;
         let certified = Instant::now();
@@ -207,6 +200,19 @@ impl Headless {
             frame_ms,
             measured,
         })
+    }
+
+    /// Where light has come that was traced meanwhile, or gone, other pipelines draw it.
+    fn follow_light(&mut self) -> Result<()> {
+        let wanted = renderer_options(&self.options, self.clipmap.has_light());
+        if wanted.traced_light != self.renderer.options().traced_light {
+            self.renderer = ClipmapRenderer::new(&self.gpu.device, &wanted)?;
+            self.sky = SkyRenderer::new(&self.gpu.device, &wanted)?;
+            self.textures = self
+                .renderer
+                .textures(&self.gpu.device, &self.clipmap, self.options.sun)?;
+        }
+        Ok(())
     }
 
     /// What frames are measured against, where that is not the levels that they are drawn from: those do not wait.
@@ -355,6 +361,19 @@ impl Headless {
     /// The device.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
+    }
+}
+
+/// How the pipelines of frames are made, with traced light or without.
+fn renderer_options(options: &HeadlessOptions, has_light: bool) -> RendererOptions {
+    RendererOptions {
+        colour_format: COLOUR_FORMAT,
+        sample_count: options.sample_count,
+        view_mode: options.view_mode,
+        traced_light: options.traced_light && has_light,
+        tint: options.tint,
+        haze: options.haze,
+        ..Default::default()
     }
 }
 

@@ -195,6 +195,7 @@ fn frame_stats(frame: &Frame, headless: &Headless, k: u64, t_s: f64, camera: &Ca
         cut: frame.update.cut,
         stale_levels: frame.update.stale_levels,
         pops: frame.update.pops,
+        provisional: frame.update.provisional,
         error_px_max: errors.map(|e| e.error_px_max),
         error_px_p99: errors.map(|e| e.error_px_p99),
         error_px_rms: errors.map(|e| e.error_px_rms),

@@ -24,6 +24,7 @@ mod paths;
 mod png;
 #[cfg(feature = "dem")]
 mod processors;
+mod projection;
 mod raw;
 mod read_at;
 mod sample;
@@ -38,6 +39,7 @@ pub use open::open_bytes;
 pub(crate) use openexr::{Wanted, read_channel};
 pub use options::{Band, Crop, OpenOptions, RawLayout, SampleType};
 pub use paths::{files_of, name_of, open, open_file, open_with};
+pub use projection::OnEarth;
 pub use read_at::{Cursor, ReadAt};
 pub use synth::{MAX_SYNTH_SIZE, Synth};
 #[cfg(feature = "dem")]
@@ -95,6 +97,12 @@ pub trait HeightSource: Send + Sync {
     /// # Errors
     /// Where the file is damaged, vanished, or uses what this crate does not read.
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()>;
+
+    /// The most memory that it holds while it is read from north to south, in bytes; what it takes on the way back is not
+    /// counted.
+    fn held_bytes(&self) -> u64 {
+        0
+    }
 
     /// What all reads so far have met; zeros where a source does not count.
     fn reads(&self) -> Reads {

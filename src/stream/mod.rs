@@ -6,20 +6,35 @@
 //!
 //! A [`Terrain`] waits for what it is asked for. [`Terrain::arriving`] is the same terrain for a view that does not: what
 //! has not been loaded is missing there, and threads load it in the order in which it is wanted.
+//!
+//! [`Terrain::open_at_once`] does not wait for a DEM's pyramid either: there is a draft of it at once, from what is quick
+//! to read, and its terrain file is built in the background, takes the draft's place, and is kept for the next run in a
+//! [`CacheFolder`].
 
 use std::path::Path;
 use std::sync::Arc;
 
 mod arriving;
+mod at_once;
+mod background;
+mod cache_folder;
+mod draft;
+mod pace;
 mod shape;
+mod stage;
 mod store;
 #[cfg(test)]
 mod tests;
 mod tiles;
 
 pub use arriving::Arriving;
+pub use at_once::AtOnce;
+pub use cache_folder::{CacheFolder, CachedFile, DEFAULT_CACHE_BYTES, Fingerprint};
+pub use pace::{Flown, Pace};
 
-use self::tiles::{Patience, Tiles};
+use self::background::Background;
+use self::stage::{Current, Stage};
+use self::tiles::Patience;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
 use crate::levels::{Arrival, Bounds, Data, Levels, LightSample, Wanted};
@@ -91,10 +106,11 @@ impl TileOptions {
 /// A terrain, shared by any number of views.
 pub struct Terrain {
     name: String,
-    levels: Arc<dyn Levels>,
+    grid: Grid,
     origin: Origin,
-    /// Where levels take a while to answer.
-    tiles: Option<Arc<Tiles>>,
+    current: Arc<Current>,
+    /// What is being built of a DEM that was opened at once. It puts what it has done in the place of `current`.
+    background: Option<Background>,
 }
 
 /// What a terrain was made from.
@@ -165,8 +181,7 @@ impl Terrain {
     pub fn from_bytes(name: &str, bytes: Arc<dyn ReadAt>, progress: &dyn Progress) -> Result<Self> {
         if is_terrain(bytes.as_ref()) {
             let file = TerrainFile::open(name, bytes)?.with_cache(READER_BYTES);
-            let origin = Origin::File(Box::new(file.meta().clone()));
-            return Ok(Self::new(name.to_string(), Arc::new(file), origin));
+            return Ok(Self::from_file(name, file, &TileOptions::default()));
         }
         Self::from_source(
             source::open_bytes(name, bytes, &OpenOptions::default())?.as_ref(),
@@ -181,72 +196,90 @@ impl Terrain {
     pub fn from_source(source: &dyn HeightSource, progress: &dyn Progress) -> Result<Self> {
         let pyramid = crate::build::build_pyramid(source, &Filter::default(), progress)?;
         let description = source.description().clone();
-        let name = description.name.clone();
-        Ok(Self::new(
-            name,
-            Arc::new(pyramid),
-            Origin::Dem(Box::new(description)),
-        ))
+        let stage = Stage::in_memory(Arc::new(pyramid));
+        Ok(Self::new(Origin::Dem(Box::new(description)), stage))
     }
 
     /// Procedural terrain.
     pub fn from_synth(synth: Synth) -> Self {
         let description = HeightSource::description(&synth).clone();
-        let name = description.name.clone();
-        Self::new(name, Arc::new(synth), Origin::Dem(Box::new(description)))
+        let stage = Stage::computed(Arc::new(synth), SYNTH_BOUNDS_SIDE, &TileOptions::default());
+        Self::new(Origin::Dem(Box::new(description)), stage)
     }
 
-    fn new(name: String, levels: Arc<dyn Levels>, origin: Origin) -> Self {
-        let terrain = Self {
-            name,
-            levels,
-            origin,
-            tiles: None,
+    fn from_file(name: &str, file: TerrainFile, tiles: &TileOptions) -> Self {
+        let origin = Origin::File(Box::new(file.meta().clone()));
+        Self {
+            name: name.to_string(),
+            ..Self::new(origin, Stage::of_file(file, tiles))
+        }
+    }
+
+    fn new(origin: Origin, stage: Stage) -> Self {
+        let name = match &origin {
+            Origin::File(meta) => meta.source.name.clone(),
+            Origin::Dem(description) => description.name.clone(),
         };
-        terrain.with_default_tiles()
-    }
-
-    fn with_default_tiles(mut self) -> Self {
-        self.tiles = self.new_tiles(&TileOptions::default());
-        self
+        Self {
+            name,
+            grid: *stage.levels.grid(),
+            origin,
+            current: Arc::new(Current::new(stage)),
+            background: None,
+        }
     }
 
     /// Keeps and loads tiles as `options` say; what was kept so far is let go.
     ///
     /// # Errors
     /// Those of [`TileOptions::check`].
-    pub fn with_tiles(mut self, options: &TileOptions) -> Result<Self> {
+    pub fn with_tiles(self, options: &TileOptions) -> Result<Self> {
         options.check()?;
-        self.tiles = self.new_tiles(options);
-        Ok(self)
-    }
-
-    /// A pyramid in memory needs none.
-    fn new_tiles(&self, options: &TileOptions) -> Option<Arc<Tiles>> {
-        let side = match &self.origin {
-            Origin::File(_) => FILE_BOUNDS_SIDE,
-            Origin::Dem(description) if description.format == "synth" => SYNTH_BOUNDS_SIDE,
-            Origin::Dem(_) => return None,
-        };
-        Some(Arc::new(Tiles::new(self.levels.clone(), side, options)))
+        let (_, stage) = self.current.get();
+        let stage = stage.with_tiles(options);
+        Ok(Self {
+            current: Arc::new(Current::new(stage)),
+            ..self
+        })
     }
 
     /// The same terrain for a view that does not wait: what has not been loaded is missing, and on its way.
     pub fn arriving(&self) -> Arriving {
-        Arriving::new(self.levels.clone(), self.tiles.clone())
+        Arriving::new(self.current.clone())
     }
 
     /// The most bytes of tiles that have been kept at once, those that were being loaded included.
     pub fn most_tile_bytes(&self) -> usize {
-        self.tiles.as_ref().map_or(0, |tiles| tiles.most_bytes())
+        self.current.get().1.tiles.map_or(0, |tiles| tiles.most_bytes())
     }
 
-    /// The tiles through which it answers itself: procedural terrain is quicker computed where it is asked for.
-    fn own_tiles(&self) -> Option<&Tiles> {
-        match &self.origin {
-            Origin::File(_) => self.tiles.as_deref(),
-            Origin::Dem(_) => None,
+    /// What loading tiles has cost so far; none where nothing was loaded.
+    pub fn pace(&self) -> Option<Pace> {
+        self.current.get().1.tiles?.pace()
+    }
+
+    /// Whether what it was opened as at once is still being built.
+    pub fn is_building(&self) -> bool {
+        self.background.as_ref().is_some_and(|b| !b.is_done())
+    }
+
+    /// Waits until a DEM that was opened at once has its heights and bounds, or cannot have them: then it is no longer
+    /// provisional, and the next run opens it.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Cancelled`].
+    pub fn wait_for_heights(&self, progress: &dyn Progress) -> Result<()> {
+        match &self.background {
+            Some(background) => background.wait_for_heights(progress),
+            None => Ok(()),
         }
+    }
+
+    /// Takes what building it in the background has to say, each once.
+    pub fn take_warnings(&self) -> Vec<String> {
+        self.background
+            .as_ref()
+            .map_or_else(Vec::new, Background::take_warnings)
     }
 
     /// The name by which messages speak of it.
@@ -281,45 +314,58 @@ impl Terrain {
 
 impl Levels for Terrain {
     fn grid(&self) -> &Grid {
-        self.levels.grid()
+        &self.grid
     }
 
     fn level_count(&self) -> u32 {
-        self.levels.level_count()
+        self.current.get().1.levels.level_count()
     }
 
     fn heights(&self, level: u32, rect: Rect, out: &mut [f32]) -> Result<Arrival> {
-        match self.own_tiles() {
+        let (_, stage) = self.current.get();
+        match stage.shared_tiles() {
             Some(tiles) => tiles.copy(Data::Heights, level, rect, out, Patience::Retry),
-            None => self.levels.heights(level, rect, out),
+            None => stage.levels.heights(level, rect, out),
         }
     }
 
     fn bounds(&self, level: u32, patches: Rect, out: &mut [Bounds]) -> Result<Arrival> {
-        match self.own_tiles() {
+        let (_, stage) = self.current.get();
+        match stage.shared_tiles() {
             Some(tiles) => tiles.copy(Data::Bounds, level, patches, out, Patience::Retry),
-            None => self.levels.bounds(level, patches, out),
+            None => stage.levels.bounds(level, patches, out),
         }
     }
 
     fn has_light(&self) -> bool {
-        self.levels.has_light()
+        self.current.get().1.levels.has_light()
     }
 
     fn light(&self, level: u32, rect: Rect, out: &mut [LightSample]) -> Result<Arrival> {
-        match self.own_tiles() {
-            Some(tiles) if self.has_light() => tiles.copy(Data::Light, level, rect, out, Patience::Retry),
-            _ => self.levels.light(level, rect, out),
+        let (_, stage) = self.current.get();
+        match stage.shared_tiles() {
+            Some(tiles) if stage.levels.has_light() => {
+                tiles.copy(Data::Light, level, rect, out, Patience::Retry)
+            }
+            _ => stage.levels.light(level, rect, out),
         }
     }
 
     fn want(&self, wanted: &[Wanted]) {
-        if let Some(tiles) = self.own_tiles() {
+        if let Some(tiles) = self.current.get().1.shared_tiles() {
             tiles.want(0, wanted);
         }
     }
 
+    fn edition(&self) -> u64 {
+        self.current.get().0
+    }
+
+    fn is_provisional(&self) -> bool {
+        self.current.get().1.levels.is_provisional()
+    }
+
     fn faults(&self) -> Vec<Error> {
-        self.levels.faults()
+        self.current.get().1.levels.faults()
     }
 }

@@ -26,7 +26,8 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    fn side(&self, data: Data) -> i64 {
+    /// Samples, or patches, along a side of a tile.
+    pub(super) fn side(&self, data: Data) -> i64 {
         if data == Data::Bounds {
             self.bounds_side
         } else {

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Barrier, Mutex};
 use std::time::{Duration, Instant};
 
+use super::stage::{Current, Stage};
 use super::tiles::{Patience, Tiles};
 use super::{Arriving, LEAST_TILE_BYTES, Terrain, TileOptions};
 use crate::error::{Error, ErrorKind, Result};
@@ -78,6 +79,13 @@ fn options(loaders: usize) -> TileOptions {
     }
 }
 
+/// A terrain that answers from `source`, and its tiles.
+fn current(source: Arc<dyn Levels>, loaders: usize) -> (Arc<Current>, Arc<Tiles>) {
+    let stage = Stage::computed(source, 32, &options(loaders));
+    let tiles = stage.tiles.clone().expect("it has been given some");
+    (Arc::new(Current::new(stage)), tiles)
+}
+
 fn arrays(seed: u64) -> Arrays {
     Arrays::random(700, 530, true, Look::Smooth, seed)
 }
@@ -110,10 +118,8 @@ fn what_arrives_is_what_was_there_and_is_read_once_for_all_views() {
     let want = all_bits(&arrays(1)).unwrap();
     for loaders in [1, 2, 4] {
         let source = Arc::new(Counted::new(arrays(1)));
-        let tiles = Arc::new(Tiles::new(source.clone(), 32, &options(loaders)));
-        let views: Vec<_> = (0..3)
-            .map(|_| Arriving::new(source.clone(), Some(tiles.clone())))
-            .collect();
+        let (current, _) = current(source.clone(), loaders);
+        let views: Vec<_> = (0..3).map(|_| Arriving::new(current.clone())).collect();
         let mut all: Vec<f32> = vec![0.0; 700 * 530];
         let whole = Rect::new(0, 0, 700, 530);
         assert_eq!(views[0].heights(0, whole, &mut all).unwrap(), Arrival::Missing);
@@ -164,8 +170,8 @@ fn a_tile_that_cannot_be_read_is_a_fault_and_read_once_even_if_its_reader_panics
         let mut source = Counted::new(arrays(3));
         source.broken = Some(panics);
         let source = Arc::new(source);
-        let tiles = Arc::new(Tiles::new(source.clone(), 32, &options(2)));
-        let view = Arriving::new(source.clone(), Some(tiles.clone()));
+        let (current, tiles) = current(source.clone(), 2);
+        let view = Arriving::new(current);
         let rect = Rect::new(10, 10, 20, 20);
         let mut out = [0f32; 100];
         view.want(&[Wanted {
@@ -199,18 +205,18 @@ fn views_that_are_gone_want_nothing_and_loaders_end_with_their_tiles() {
     let mut source = Counted::new(arrays(4));
     source.delay = Duration::from_millis(2);
     let source = Arc::new(source);
-    let tiles = Arc::new(Tiles::new(source.clone(), 32, &options(2)));
-    let view = Arriving::new(source.clone(), Some(tiles.clone()));
+    let (current, tiles) = current(source.clone(), 2);
+    let view = Arriving::new(current.clone());
     view.want(&everything(source.as_ref()));
     drop(view);
-    let other = Arriving::new(source.clone(), Some(tiles.clone()));
+    let other = Arriving::new(current.clone());
     settle(&other);
     assert!(
         source.reads().len() < 12,
         "{} tiles were read in vain",
         source.reads().len()
     );
-    drop((other, tiles));
+    drop((other, tiles, current));
     // The loaders held the source too.
     assert_eq!(Arc::strong_count(&source), 1);
 }
@@ -220,10 +226,8 @@ fn the_budget_holds_whoever_reads() {
     let random = &mut Random::new(6);
     let grid = Grid::new(9000, 9000, [1.0, 1.0]);
     let synth = Arc::new(crate::source::Synth::new(9000, 3).unwrap());
-    let tiles = Arc::new(Tiles::new(synth.clone(), 32, &options(2)));
-    let views: Vec<_> = (0..2)
-        .map(|_| Arriving::new(synth.clone(), Some(tiles.clone())))
-        .collect();
+    let (current, tiles) = current(synth, 2);
+    let views: Vec<_> = (0..2).map(|_| Arriving::new(current.clone())).collect();
     let some = |random: &mut Random| {
         let (x, z) = (random.below(8700), random.below(8700));
         Rect::new(x, z, x + 256, z + 256).intersection(grid.level(0).rect())

@@ -1,10 +1,13 @@
 //! Tiles of levels, read and decoded once however many views want them, by loader threads or by who cannot go on without.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use std::time::Instant;
 
 use super::TileOptions;
+use super::pace::Pace;
 use super::shape::{Key, Shape, copy_part, words_per_sample};
 use super::store::{ENTRY_BYTES, Outcome, Store};
 use crate::error::{Error, ErrorKind, Result};
@@ -37,6 +40,8 @@ struct Shared {
     work: Condvar,
     /// A tile has come, or cannot be had.
     done: Condvar,
+    /// By kind of data: samples that were loaded, and the nanoseconds that it took.
+    loaded: [(AtomicU64, AtomicU64); 3],
 }
 
 impl Tiles {
@@ -54,6 +59,7 @@ impl Tiles {
                 store: Mutex::new(Store::new(options.memory_bytes)),
                 work: Condvar::new(),
                 done: Condvar::new(),
+                loaded: Default::default(),
             }),
             loaders: options.loaders,
             threads: Mutex::default(),
@@ -122,6 +128,18 @@ impl Tiles {
     /// The most bytes of tiles that there have been at once.
     pub(super) fn most_bytes(&self) -> usize {
         self.shared.lock().most_bytes()
+    }
+
+    /// What loading has cost so far; none where nothing was loaded.
+    pub(super) fn pace(&self) -> Option<Pace> {
+        let loaded = &self.shared.loaded;
+        let read = |n: &AtomicU64| n.load(Ordering::Relaxed) as f64;
+        let any = loaded.iter().any(|(samples, _)| read(samples) > 0.0);
+        any.then(|| Pace {
+            shape: self.shared.shape,
+            sample_s: std::array::from_fn(|k| 1e-9 * read(&loaded[k].1) / read(&loaded[k].0).max(1.0)),
+            loaders: self.loaders,
+        })
     }
 
     fn fetch(&self, key: Key, patience: Patience) -> Option<Outcome> {
@@ -214,10 +232,16 @@ impl Shared {
 
     /// Reads a tile. A source of the caller's own that panics has given no tile; nobody waits for it for ever.
     fn load(&self, key: Key) -> Outcome {
-        catch_unwind(AssertUnwindSafe(|| self.read(key))).unwrap_or_else(|_| {
+        let start = Instant::now();
+        let outcome = catch_unwind(AssertUnwindSafe(|| self.read(key))).unwrap_or_else(|_| {
             let what = format!("{key:?} could not be read: its reader panicked");
             Err(Error::new(ErrorKind::Broken, "terrain", what))
-        })
+        });
+        let (samples, ns) = &self.loaded[key.data as usize];
+        samples.fetch_add(self.shape.rect(key).area() as u64, Ordering::Relaxed);
+        let took = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
+        ns.fetch_add(took, Ordering::Relaxed);
+        outcome
     }
 
     fn read(&self, key: Key) -> Outcome {

@@ -16,10 +16,10 @@
 //! by row, in each row channel by channel in alphabetical order, samples little-endian, the tile cut at the
 //! part's edge.
 //!
-//! *Order of tiles.* By the row of level 0 that must have been seen before the tile is finished (the last
-//! under the tile, but at most the DEM's last); where equal the finer level first; then heights, bounds, light,
-//! check; within a row of tiles from west to east. `check.bounds` is last. So a single thread that works from
-//! north to south can write every tile as soon as it is whole.
+//! *Order of tiles.* Heights first, then bounds, light, checks and `check.bounds`: each kind is made in a pass of its
+//! own over what stands before it. Heights, bounds and light stand in the order of the rows of level 0 that a pass from
+//! north to south must have seen ([`TileRow::seen`]); where equal the finer level first; within a row of tiles from
+//! west to east. So one pass can write every tile as soon as that many rows were seen, and hold few of them.
 
 use exr::meta::attribute::SampleType;
 
@@ -30,6 +30,9 @@ pub const FORMAT_VERSION: u32 = 1;
 
 /// Samples along a tile's side.
 pub const TILE: i64 = 256;
+
+/// Steps of a level by which the filter of any kernel, cascaded from level 0, stays below: see [`TileRow::seen`].
+const FILTER_REACH: i64 = 64;
 
 /// The greatest side of a part: OpenEXR's windows end below 2^30 - 1.
 pub const MAX_SIDE: i64 = (1 << 30) - 2;
@@ -118,6 +121,11 @@ pub struct TileRow {
     pub part: usize,
     /// Row of tiles.
     pub y: i64,
+    /// Rows of level 0 after which it is certainly known, at most the DEM's. Of heights and light those under the tiles
+    /// and 64 of the level's own steps more: a kernel of 32 lobes reaches 63 samples of the next finer level, as many of
+    /// the one below that, and so on, in all less than 63 steps of the level. Of bounds those under the patches and one
+    /// patch more: saturation asks the next finer level for one patch more than the children, and so on down.
+    pub seen: i64,
 }
 
 /// All parts of a terrain file.
@@ -238,23 +246,30 @@ impl Layout {
     /// All rows of tiles in the order of the file.
     pub fn order(&self) -> Vec<TileRow> {
         let rows = self.parts[0].size.height;
-        let mut order: Vec<((i64, u32, Kind), TileRow)> = Vec::new();
+        let mut order = Vec::new();
         for (part, Part { kind, level, .. }) in self.parts.iter().enumerate() {
-            let samples = match kind {
-                Kind::Height | Kind::Light => TILE,
-                Kind::Bounds => TILE * PATCH,
-                Kind::Check => TILE * TILE,
-                Kind::CheckBounds => continue,
-            };
             for y in 0..self.parts[part].tiles().height {
-                let finished = (((y + 1) * samples) << level).min(rows);
-                order.push(((finished, *level, *kind), TileRow { part, y }));
+                let under = match (kind, level) {
+                    (Kind::Height, 0) => (y + 1) * TILE,
+                    (Kind::Height | Kind::Light, _) => (y + 1) * TILE + FILTER_REACH,
+                    (Kind::Bounds, _) => ((y + 1) * TILE + 1) * PATCH,
+                    (Kind::Check | Kind::CheckBounds, _) => rows,
+                };
+                let seen = (under << level).min(rows);
+                order.push(TileRow { part, y, seen });
             }
         }
-        order.sort_by_key(|(key, row)| (*key, row.y));
-        let last = self.parts.len() - 1;
-        let mut order: Vec<TileRow> = order.into_iter().map(|(_, row)| row).collect();
-        order.extend((0..self.parts[last].tiles().height).map(|y| TileRow { part: last, y }));
+        order.sort_by_key(|row| {
+            let Part { kind, level, .. } = self.parts[row.part];
+            (kind, row.seen, level, row.y)
+        });
+        order
+    }
+
+    /// The rows of tiles of `kind`, in the order of the file.
+    pub fn order_of(&self, kind: Kind) -> Vec<TileRow> {
+        let mut order = self.order();
+        order.retain(|row| self.parts[row.part].kind == kind);
         order
     }
 }
@@ -316,9 +331,40 @@ mod tests {
                 }
             }
         }
-        // The first row of tiles of level 1 follows the second of level 0.
+        // The first row of tiles of level 1 needs 128 rows of level 0 beyond the second.
         let at = |l, y| place(layout.part(Kind::Height, l), y);
         assert!(at(0, 1) < at(1, 0) && at(1, 0) < at(0, 2));
+        // Each kind follows the one it is made of.
+        let kinds: Vec<Kind> = order.iter().map(|row| layout.parts()[row.part].kind).collect();
+        assert!(kinds.is_sorted());
+    }
+
+    #[test]
+    fn rows_are_known_once_as_many_were_seen_as_the_order_says() {
+        for (width, height) in [(3, 70_000), (1, 1), (1, 300), (70, 5001)] {
+            let grid = Grid::new(width, height, [1.0, 1.0]);
+            let layout = Layout::new(&grid, true).unwrap();
+            for row in layout.order() {
+                let Part { kind, level, size } = layout.parts()[row.part];
+                let last = ((row.y + 1) * TILE).min(size.height) - 1;
+                // The row of level 0 that the last row of the tile needs, by walking down.
+                let mut needs = last;
+                for finer in (0..level).rev() {
+                    let (reach, count) = match kind {
+                        Kind::Height | Kind::Light => (63, grid.level(finer).height),
+                        Kind::Bounds => (2, grid.patches(finer).height),
+                        Kind::Check | Kind::CheckBounds => continue,
+                    };
+                    needs = (2 * needs + reach).min(count - 1);
+                }
+                if kind == Kind::Bounds {
+                    needs = ((needs + 1) * PATCH).min(height - 1);
+                }
+                if !matches!(kind, Kind::Check | Kind::CheckBounds) {
+                    assert!(needs < row.seen, "{width} x {height}: {row:?} needs {needs}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -32,6 +32,14 @@ const PAGES_BYTES: usize = 1 << 20;
 /// What stands before a tile's data: part, tile x and y, level x and y, length in bytes, each an i32.
 pub(super) const TILE_HEAD_BYTES: usize = 24;
 
+/// Tables of a file in the making, as far as they have come.
+pub(super) struct Unwritten {
+    /// Of each part the offset of each tile, row by row; 0 where it has not been put.
+    pub(super) tables: Vec<Vec<u64>>,
+    /// Of each check part its samples: of each channel one value.
+    pub(super) checks: Vec<Vec<[u32; 2]>>,
+}
+
 /// An open terrain file.
 pub struct TerrainFile {
     name: String,
@@ -41,6 +49,8 @@ pub struct TerrainFile {
     /// Where each part's offset table begins.
     tables_at: Vec<u64>,
     pages: Cache,
+    /// What the writer of a file in the making knows, and the file does not say yet.
+    unwritten: Option<Unwritten>,
     cache: Cache,
 }
 
@@ -67,10 +77,31 @@ impl TerrainFile {
             layout,
             tables_at,
             pages: Cache::new(PAGES_BYTES),
+            unwritten: None,
             cache,
         };
         file.check_end()?;
         Ok(file)
+    }
+
+    /// A file in the making: the tiles that its tables know of, checked by what its writer kept.
+    pub(super) fn unfinished(
+        name: &str,
+        bytes: Arc<dyn ReadAt>,
+        meta: Meta,
+        layout: Layout,
+        unwritten: Unwritten,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            bytes,
+            meta,
+            layout,
+            tables_at: Vec::new(),
+            pages: Cache::new(0),
+            unwritten: Some(unwritten),
+            cache: Cache::new(DEFAULT_CACHE_BYTES),
+        }
     }
 
     /// The same with a cache of another size, in bytes of decoded tiles.
@@ -130,6 +161,9 @@ impl TerrainFile {
     fn offset(&self, part: usize, x: i64, y: i64) -> Result<u64> {
         let tiles = self.layout.parts()[part].tiles();
         let index = (y * tiles.width + x) as u64;
+        if let Some(unwritten) = &self.unwritten {
+            return Ok(unwritten.tables[part][index as usize]);
+        }
         let page = index / PAGE_OFFSETS;
         let key = (part, page as i64, 0);
         let bytes = match self.pages.get(key) {
@@ -231,6 +265,10 @@ impl TerrainFile {
 
     /// One value of a check part.
     fn check_value(&self, part: usize, x: i64, z: i64, channel: usize) -> Result<u32> {
+        if let Some(unwritten) = &self.unwritten {
+            let width = self.layout.parts()[part].size.width;
+            return Ok(unwritten.checks[part][(z * width + x) as usize][channel]);
+        }
         let at = Rect::new(x, z, x + 1, z + 1);
         let (tx, ty) = (x / super::layout::TILE, z / super::layout::TILE);
         let tile = self.tile(part, tx, ty)?;

@@ -311,7 +311,7 @@ fn the_exr_crate_reads_every_part_as_written() {
                         arrays.heights[level].iter().map(|h| h.to_bits().into()).collect()
                     }
                     layout::Kind::Bounds => {
-                        let field = tile::BOUNDS_FIELDS[index];
+                        let field = BOUNDS_FIELDS[index];
                         let of = |b: &crate::levels::Bounds| bytemuck::cast::<_, [u32; 6]>(*b)[field].into();
                         arrays.bounds[level].iter().map(of).collect()
                     }

@@ -8,9 +8,9 @@ use bytemuck::{Pod, bytes_of, pod_read_unaligned};
 use crate::grid::Rect;
 
 /// For each channel of a bounds part (alphabetical) the field of [`crate::levels::Bounds`] it holds.
-pub(super) const BOUNDS_FIELDS: [usize; 6] = [2, 1, 0, 5, 4, 3];
+pub(crate) const BOUNDS_FIELDS: [usize; 6] = [2, 1, 0, 5, 4, 3];
 /// For each channel of a light part the field of [`crate::levels::LightSample`] it holds.
-pub(super) const LIGHT_FIELDS: [usize; 2] = [1, 0];
+pub(crate) const LIGHT_FIELDS: [usize; 2] = [1, 0];
 
 /// The CRC-32C of a decoded tile, over its little-endian bytes.
 pub(super) fn check(bytes: &[u8], sample_bytes: usize) -> u32 {
@@ -30,8 +30,25 @@ pub(super) fn little_endian(mut bytes: Vec<u8>, sample_bytes: usize) -> Vec<u8> 
 
 /// Lays samples of `N` fields out as a tile `width` samples wide; channel c holds field `fields[c]`.
 pub(super) fn pack<T: Pod, const N: usize>(samples: &[[T; N]], width: usize, fields: [usize; N]) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(size_of_val(samples));
-    for row in samples.chunks_exact(width) {
+    pack_columns(samples, width as i64, 0..width as i64, fields)
+}
+
+/// The same of some columns of rows `width` samples wide.
+pub(crate) fn pack_columns<T: Pod, const N: usize>(
+    samples: &[[T; N]],
+    width: i64,
+    columns: std::ops::Range<i64>,
+    fields: [usize; N],
+) -> Vec<u8> {
+    let rows = samples.len() / width as usize;
+    let columns = columns.start as usize..columns.end as usize;
+    let mut bytes = Vec::with_capacity(rows * columns.len() * size_of::<[T; N]>());
+    for row in samples.chunks_exact(width as usize) {
+        let row = &row[columns.clone()];
+        if N == 1 {
+            bytes.extend_from_slice(bytemuck::cast_slice(row.as_flattened()));
+            continue;
+        }
         for field in fields {
             for sample in row {
                 bytes.extend_from_slice(bytes_of(&sample[field]));
@@ -58,6 +75,11 @@ pub(super) fn unpack<T: Pod, const N: usize>(
         let start = ((z - rect.z0) * rect.width() + both.x0 - rect.x0) as usize;
         for (channel, field) in fields.into_iter().enumerate() {
             let from = &tile[row + channel * plane..][..count * size];
+            if N == 1 {
+                let to: &mut [u8] = bytemuck::cast_slice_mut(out[start..start + count].as_flattened_mut());
+                to.copy_from_slice(from);
+                continue;
+            }
             for (sample, bytes) in out[start..start + count].iter_mut().zip(from.chunks_exact(size)) {
                 sample[field] = pod_read_unaligned(bytes);
             }

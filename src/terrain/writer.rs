@@ -2,7 +2,7 @@
 //! whoever has them.
 
 use std::io::{Seek, SeekFrom, Write};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedTileBlock, TileCoordinates};
 use exr::meta::MetaData;
@@ -11,12 +11,14 @@ use exr::prelude::Vec2;
 use super::header;
 use super::layout::{Kind, Layout, Part, TileRow};
 use super::meta::Meta;
+use super::reader::{TerrainFile, Unwritten};
 use super::tile::{BOUNDS_FIELDS, LIGHT_FIELDS, check, little_endian, pack};
 use super::zip;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
 use crate::levels::{Arrival, Bounds, Levels, LightSample};
 use crate::progress::Progress;
+use crate::source::ReadAt;
 use crate::work::Work;
 
 const SUBJECT: &str = "terrain file";
@@ -48,7 +50,7 @@ pub fn write<W: Write + Seek + Sync>(
     }
     let mut writer = TerrainWriter::new(out, meta)?;
     progress.begin("write", writer.layout.tile_count());
-    for TileRow { part, y } in writer.layout.order() {
+    for TileRow { part, y, .. } in writer.layout.order() {
         let width = writer.layout.parts()[part].tiles().width;
         for x0 in (0..width).step_by(BATCH as usize) {
             if progress.cancelled() {
@@ -232,6 +234,30 @@ impl<W: Write + Seek> TerrainWriter<W> {
         }
         let samples: Vec<[u32; 1]> = samples.into_iter().map(|[first, _]| [first]).collect();
         pack(&samples, rect.width() as usize, [0])
+    }
+
+    /// The tiles that have been put, as an open file whose checks are those that were kept here: what a later pass
+    /// makes of them is made of what the file holds. `bytes` are the file's.
+    ///
+    /// # Errors
+    /// What `out` meets as it is flushed.
+    pub fn readable(
+        &mut self,
+        name: &str,
+        meta: &Meta,
+        open: impl FnOnce() -> Result<Arc<dyn ReadAt>>,
+    ) -> Result<TerrainFile> {
+        self.out.flush().map_err(|e| Error::io(SUBJECT, e))?;
+        Ok(TerrainFile::unfinished(
+            name,
+            open()?,
+            meta.clone(),
+            self.layout.clone(),
+            Unwritten {
+                tables: self.tables.clone(),
+                checks: self.checks.clone(),
+            },
+        ))
     }
 
     /// The decoded samples of any tile: of `levels`, or of the checks so far.

@@ -304,3 +304,25 @@ fn the_last_row_and_column_follow_the_rule() {
     assert_eq!(run(&[nan, 5.0, 2.0, 9.0], 4, 1)[2], 9.0);
     assert!(run(&[1.0, 5.0, 2.0, nan], 4, 1)[2].is_nan());
 }
+
+#[test]
+fn rounding_is_that_of_the_standard_library() {
+    let random = &mut Random::new(31);
+    let halves = (-9..9).map(|n| f64::from(n) / 2.0);
+    let special = [
+        0.0,
+        -0.0,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        1e300,
+        4503599627370495.5,
+        4503599627370497.0,
+    ];
+    let any = (0..100_000)
+        .map(|_| f64::from_bits(random.bits()))
+        .filter(|x| !x.is_nan());
+    for x in halves.chain(special).chain(any) {
+        assert_eq!(round_ties_even(x).to_bits(), x.round_ties_even().to_bits(), "{x}");
+    }
+    assert!(round_ties_even(f64::NAN).is_nan());
+}

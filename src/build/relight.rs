@@ -1,0 +1,206 @@
+//! Lights a terrain file anew: its heights and bounds are copied, its light is traced and filtered again.
+
+use std::io::BufWriter;
+use std::path::Path;
+use std::time::Instant;
+
+use super::memory::peak_rss_bytes;
+use super::output::Output;
+use super::preprocess::{PreprocessOptions, PreprocessReport};
+use super::threads::Threads;
+use crate::error::{Error, ErrorKind, Result};
+use crate::grid::{Grid, Rect};
+use crate::levels::{Arrival, Bounds, Levels, LightSample};
+use crate::light::{Earth, LightOptions, light_levels, sky_share_on, sun_share_on};
+use crate::progress::Progress;
+use crate::pyramid::{Filter, FilterKind};
+use crate::terrain::{self, LightMeta, Meta, TerrainFile};
+
+/// Bytes a sample of level 0 takes at the peak: its height, two shares, their levels before and after rounding; and
+/// what does not depend on the DEM.
+const BYTES_A_SAMPLE: u64 = 24;
+const FIXED_BYTES: u64 = 64 << 20;
+
+/// Rows of heights that are read at once.
+const BAND_ROWS: i64 = 256;
+
+/// Makes the terrain file `out` of `file`, with the light that `options` say, or none, in place of its own. Heights and
+/// bounds are those of `file`, to the bit, and so are the bytes of their tiles where this version made them. `out` may
+/// be `file` itself, where `force` is set: it is replaced when the new file is whole.
+///
+/// Of `options`, those on the DEM (filter, source) are not used: light is filtered as the file's levels were.
+///
+/// # Errors
+/// [`ErrorKind::Misuse`] where `out` exists and `force` is not set, or the options make no sense;
+/// [`ErrorKind::Unsupported`] where the file's filter is not known; [`ErrorKind::Limit`] where that takes more memory
+/// than is allowed; [`ErrorKind::Cancelled`]; and what reading and writing meet.
+pub fn relight(
+    file: &TerrainFile,
+    out: &Path,
+    options: &PreprocessOptions,
+    progress: &dyn Progress,
+) -> Result<PreprocessReport> {
+    let Meta { grid, place, .. } = file.meta();
+    let filter = filter_of(file)?;
+    if let Some(light) = &options.light {
+        light.sun.check()?;
+        check_memory(file, options.memory_bytes)?;
+    }
+    let earth = Earth::of(grid, place.as_ref(), options.curvature).map_err(|e| e.about(file.name()))?;
+    let threads = Threads::new(options.threads)?;
+    let start = Instant::now();
+    let (output, target) = Output::create(out, options.force)?;
+    let mut report = PreprocessReport {
+        samples: grid.size.samples() as u64,
+        threads: threads.count(),
+        ..PreprocessReport::default()
+    };
+    let steps = |report: &mut PreprocessReport| -> Result<()> {
+        let light = match &options.light {
+            Some(light) => trace(file, light, &earth, &filter, &threads, progress, report)?,
+            None => Vec::new(),
+        };
+        let written = Instant::now();
+        let meta = describe(file, options, &earth);
+        let relit = Relit { file, light };
+        terrain::write(
+            BufWriter::with_capacity(1 << 20, &target),
+            &meta,
+            &relit,
+            &threads,
+            progress,
+        )
+        .map_err(|e| match e.subject() {
+            "terrain file" => e.about(out.display()),
+            _ => e,
+        })?;
+        output.publish(&target)?;
+        report.write_s = written.elapsed().as_secs_f64();
+        Ok(())
+    };
+    match steps(&mut report) {
+        Err(e) if e.kind() == ErrorKind::Cancelled => Err(Error::cancelled(file.name())),
+        Err(e) => Err(e),
+        Ok(()) => {
+            report.total_s = start.elapsed().as_secs_f64();
+            report.peak_rss_bytes = peak_rss_bytes();
+            Ok(report)
+        }
+    }
+}
+
+/// The filter that made the levels of a file.
+fn filter_of(file: &TerrainFile) -> Result<Filter> {
+    let Meta { filter, lobes, .. } = file.meta();
+    let known = filter.parse::<FilterKind>().ok().map(Filter::from);
+    known.filter(|known| known.lobes() == *lobes).ok_or_else(|| {
+        let what = format!(
+            "its levels were made by the filter {filter:?} of {lobes} lobes, which is not known here"
+        );
+        Error::new(ErrorKind::Unsupported, file.name(), what).advice("preprocess the DEM that it was made of")
+    })
+}
+
+/// Refuses a file whose light takes more than `ceiling_bytes`.
+fn check_memory(file: &TerrainFile, ceiling_bytes: u64) -> Result<()> {
+    let samples = file.grid().size.samples() as u64;
+    let needed = samples.saturating_mul(BYTES_A_SAMPLE).saturating_add(FIXED_BYTES);
+    if needed <= ceiling_bytes {
+        return Ok(());
+    }
+    let needed = needed.div_ceil(1 << 20);
+    let what = format!(
+        "its light needs {needed} MiB of memory, {} MiB are allowed",
+        ceiling_bytes >> 20
+    );
+    Err(Error::new(ErrorKind::Limit, file.name(), what).advice(format!("allow {needed} MiB")))
+}
+
+/// The light of all levels, and the seconds that its parts took.
+fn trace(
+    file: &TerrainFile,
+    light: &LightOptions,
+    earth: &Earth,
+    filter: &Filter,
+    threads: &Threads,
+    progress: &dyn Progress,
+    report: &mut PreprocessReport,
+) -> Result<Vec<Vec<LightSample>>> {
+    let grid = file.grid();
+    let (width, height) = (grid.size.width, grid.size.height);
+    let mut lap = Instant::now();
+    let mut seconds = || {
+        let now = Instant::now();
+        (now - std::mem::replace(&mut lap, now)).as_secs_f64()
+    };
+    let mut heights = vec![f32::NAN; grid.size.samples() as usize];
+    progress.begin("read", heights.len() as u64);
+    let bands = heights.chunks_mut((BAND_ROWS * width) as usize);
+    for (band, z) in bands.zip((0..height).step_by(BAND_ROWS as usize)) {
+        if progress.cancelled() {
+            return Err(Error::cancelled(file.name()));
+        }
+        let rect = Rect::new(0, z, width, (z + BAND_ROWS).min(height));
+        match file.heights(0, rect, band)? {
+            Arrival::Arrived => progress.advance(band.len() as u64),
+            Arrival::Missing => {
+                return Err(Error::new(ErrorKind::Io, file.name(), "its heights did not come"));
+            }
+        }
+    }
+    report.read_s = seconds();
+    let sun = sun_share_on(&heights, grid, earth, light.sun, threads, progress)?;
+    report.sun_s = seconds();
+    let sky = sky_share_on(&heights, grid, earth, light.sky_directions, threads, progress)?;
+    let levels = light_levels(grid, &heights, sun, sky, filter, threads, progress)?;
+    report.sky_s = seconds();
+    Ok(levels)
+}
+
+/// What the new file says of itself.
+fn describe(file: &TerrainFile, options: &PreprocessOptions, earth: &Earth) -> Meta {
+    let mut meta = file.meta().clone();
+    meta.light = options.light.map(|light| LightMeta {
+        sun_azimuth_deg: light.sun.azimuth_deg,
+        sun_altitude_deg: light.sun.altitude_deg,
+        sky_directions: light.sky_directions,
+    });
+    meta.tool = terrain::TOOL.into();
+    let earth = options.light.map(|_| *earth);
+    Earth::assume(earth.as_ref(), meta.place.as_ref(), &meta.grid, &mut meta.assumed);
+    meta
+}
+
+/// A terrain file with other light, or none.
+struct Relit<'a> {
+    file: &'a TerrainFile,
+    light: Vec<Vec<LightSample>>,
+}
+
+impl Levels for Relit<'_> {
+    fn grid(&self) -> &Grid {
+        self.file.grid()
+    }
+
+    fn heights(&self, level: u32, rect: Rect, out: &mut [f32]) -> Result<Arrival> {
+        self.file.heights(level, rect, out)
+    }
+
+    fn bounds(&self, level: u32, patches: Rect, out: &mut [Bounds]) -> Result<Arrival> {
+        self.file.bounds(level, patches, out)
+    }
+
+    fn has_light(&self) -> bool {
+        !self.light.is_empty()
+    }
+
+    fn light(&self, level: u32, rect: Rect, out: &mut [LightSample]) -> Result<Arrival> {
+        let width = self.grid().level(level).width;
+        let rows = out.chunks_mut(rect.width().max(1) as usize);
+        for (z, row) in (rect.z0..rect.z1).zip(rows) {
+            let from = (z * width + rect.x0) as usize;
+            row.copy_from_slice(&self.light[level as usize][from..from + row.len()]);
+        }
+        Ok(Arrival::Arrived)
+    }
+}
