@@ -50,6 +50,7 @@ th, td { padding: .28rem .6rem; border-bottom: 1px solid #e4e4e4; text-align: ri
 th { font-weight: 600; border-bottom: 2px solid #bbb; vertical-align: bottom; } td.text, th.text { text-align: left; }
 .wide { font-size: 12.5px; } .wide th, .wide td { padding: .2rem .38rem; } .wide td { white-space: nowrap; }
 tr.front td { background: #eef6fb; } tr.cut td { color: #888; }
+.answer code, table code { white-space: nowrap; }
 .answer { border-left: 4px solid #0072b2; padding: .1rem 0 .1rem 1rem; margin: .8rem 0; }
 .fails { color: #b00020; font-weight: 600; }
 ";
