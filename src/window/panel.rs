@@ -16,6 +16,9 @@ const FIRST_MAX_ERROR_PX: f64 = 1.0;
 /// Distance of the panel and of notices from the window's border, in points.
 const MARGIN: f32 = 12.0;
 
+/// Width of a window from which on the help stands in two columns, in points.
+const TWO_COLUMNS: f32 = 900.0;
+
 /// Width of a slider in points.
 const SLIDER_WIDTH: f32 = 130.0;
 
@@ -213,9 +216,14 @@ fn help(ctx: &Context) {
         .resizable(false)
         .show(ctx, |ui| {
             scrolled(ui, |ui| {
-                let half = BINDINGS.len().div_ceil(2);
+                let columns = if ctx.content_rect().width() < TWO_COLUMNS {
+                    1
+                } else {
+                    2
+                };
+                let rows = BINDINGS.len().div_ceil(columns);
                 ui.horizontal_top(|ui| {
-                    for (k, bindings) in BINDINGS.chunks(half).enumerate() {
+                    for (k, bindings) in BINDINGS.chunks(rows).enumerate() {
                         egui::Grid::new(("keys", k))
                             .num_columns(2)
                             .striped(true)
