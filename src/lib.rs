@@ -6,7 +6,8 @@
 //! 2. It is *filtered* into ever coarser levels, and each patch of each level bounded: [`pyramid`].
 //! 3. Light is *traced* over the finest level and filtered likewise: [`light`].
 //! 4. All of it is *stored* in a terrain file: [`build`] drives, [`terrain`] writes and reads.
-//! 5. Any of these answers as [`levels::Levels`]; [`stream::Terrain`] opens whatever a user names.
+//! 5. Any of these answers as [`levels::Levels`]; [`stream::Terrain`] opens whatever a user names, and brings it tile by
+//!    tile to views that do not wait.
 //! 6. Around the camera, each level's window is *made resident*: [`clipmap::Window`], moved by the rectangles of
 //!    [`clipmap::UpdatePlan`]; [`clipmap::Selection`] lists the patches to draw.
 //! 7. The GPU holds copies of the windows ([`gpu::ViewTextures`]). A vertex is *displaced* in

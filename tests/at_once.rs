@@ -266,3 +266,70 @@ fn a_dem_that_changes_while_it_is_built_is_said_and_its_draft_flown_on() {
         );
     }
 }
+
+/// A draft's frame against the one that waits: the signal-to-noise ratio in dB, and pixels of sky where that has ground.
+#[cfg(feature = "gpu")]
+fn compared(gpu: &clipscape::gpu::Gpu, draft: &dyn Levels, whole: &Terrain, shift_m: f64) -> (f64, usize) {
+    use clipscape::render::{Headless, HeadlessOptions};
+
+    let frame = |levels: &dyn Levels, wait: Wait, shift_m: f64| {
+        let options = HeadlessOptions {
+            size_px: [320, 180],
+            sample_count: 1,
+            view_mode: clipscape::shade::ViewMode::Shaded,
+            tint: true,
+            haze: true,
+            traced_light: false,
+            sun: clipscape::light::Sun::default(),
+            clipmap: ClipmapOptions {
+                clip_size: 256,
+                wait,
+                ..OPTIONS
+            },
+        };
+        let mut headless = Headless::new(gpu.clone(), levels, &options).unwrap();
+        let camera = clipscape::Camera {
+            eye: DVec3::new(55_000.0 + shift_m, 14_000.0, 110_000.0),
+            heading_deg: 0.0,
+            pitch_deg: -20.0,
+            roll_deg: 0.0,
+            fov_deg: 60.0,
+        };
+        let frame = headless.frame(levels, &camera, 0.0).unwrap();
+        (frame.rgba8, headless.read_depth().unwrap())
+    };
+    let (draft, whole) = (frame(draft, Wait::None, shift_m), frame(whole, Wait::All, 0.0));
+    let squares = draft
+        .0
+        .iter()
+        .zip(&whole.0)
+        .map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
+    // Alpha is the same everywhere.
+    let mean = squares.sum::<f64>() / (0.75 * draft.0.len() as f64);
+    let holes = draft
+        .1
+        .iter()
+        .zip(&whole.1)
+        .filter(|(a, b)| **a == 0.0 && **b > 0.0);
+    (10.0 * (255.0 * 255.0 / mean).log10(), holes.count())
+}
+
+#[cfg(feature = "gpu")]
+#[test]
+fn a_draft_s_picture_is_like_the_one_that_waits() {
+    let Some(gpu) = support::gpu() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let terrain = open(Some(folder.path()), &Silent);
+    let arriving = terrain.arriving();
+    assert!(arriving.is_provisional());
+    let whole = Terrain::open(DEM, &Silent).unwrap();
+    let (ratio_db, holes) = compared(&gpu, &arriving, &whole, 0.0);
+    assert!(ratio_db > 20.0, "{ratio_db} dB");
+    // Crests of the draft may be lower by a pixel.
+    assert!(holes < 320, "{holes} pixels of sky where there is ground");
+    let (shifted_db, _) = compared(&gpu, &arriving, &whole, 8000.0);
+    assert!(
+        shifted_db < ratio_db - 3.0,
+        "control: {shifted_db} dB against {ratio_db}"
+    );
+}

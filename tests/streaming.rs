@@ -224,3 +224,27 @@ fn views_share_what_was_loaded() {
     let mut other = Clipmap::new(&third, &options(Wait::None)).unwrap();
     assert!(!other.update(&third, &spot, 0.0).unwrap().complete, "control");
 }
+
+#[test]
+fn a_first_frame_reads_no_level_that_it_does_not_show() {
+    let terrain = Terrain::from_synth(Synth::new(2000, 5).unwrap());
+    let high = view(glam::DVec3::new(30_000.0, 30_000.0, 30_000.0));
+    let mut clipmap = Clipmap::new(&terrain, &options(Wait::None)).unwrap();
+    let mut waiting = Clipmap::new(&terrain, &options(Wait::All)).unwrap();
+    let report = *clipmap.update(&terrain, &high, 0.0).unwrap();
+    waiting.update(&terrain, &high, 0.0).unwrap();
+    let missing = |c: &Clipmap| {
+        c.windows()
+            .iter()
+            .filter(|w| w.missing().next().is_some())
+            .count()
+    };
+    assert!(report.complete && missing(&clipmap) > 0 && missing(&waiting) == 0);
+    let drawn = |c: &Clipmap| c.selection().instances().copied().collect::<Vec<_>>();
+    assert!(drawn(&clipmap) == drawn(&waiting));
+    // What it may show from lower down comes with the frames that follow.
+    for k in 1..60 {
+        clipmap.update(&terrain, &high, f64::from(k)).unwrap();
+    }
+    assert_eq!(missing(&clipmap), 0);
+}

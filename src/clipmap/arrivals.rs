@@ -53,8 +53,9 @@ impl Faults {
     }
 }
 
-/// Samples of windows that take the place of others, which are read in one frame, at least: a tile.
-const SUCCESSOR_SAMPLES: i64 = TILE * TILE;
+/// Bytes of samples that an update writes at most where no budget is set, but for the first: filling in that much takes
+/// about 2 ms, and what has arrived all at once can wait a frame.
+const FRAME_BYTES: u64 = 768 << 10;
 
 /// Where the eye is, and where it is going.
 #[derive(Clone, Copy, Debug)]
@@ -62,6 +63,8 @@ pub(super) struct Course<'a> {
     pub(super) eye: &'a Eye,
     /// Where it will be in a moment, if it goes on like that.
     pub(super) ahead: Eye,
+    /// The finest level that shows anything from here.
+    pub(super) finest_shown: usize,
 }
 
 impl Clone for Arrivals {
@@ -112,8 +115,8 @@ impl Arrivals {
         Ok(())
     }
 
-    /// Reads what is there of what `windows` miss, near ground first, until `budget_bytes` of samples are written.
-    /// The coarsest level is beyond any budget: without it nothing can be drawn.
+    /// Reads what is there of what `windows` miss, near ground first, until `budget_bytes` of samples are written, or where
+    /// none are said and there is something to be drawn, [`FRAME_BYTES`]. The coarsest level is beyond any budget: without it nothing can be drawn.
     ///
     /// # Errors
     /// Those of `levels` but for data that are damaged or cannot be read, which stay missing and are noted; there is
@@ -129,10 +132,13 @@ impl Arrivals {
         budget_bytes: Option<u64>,
     ) -> Result<()> {
         let coarsest = windows.len() as u32 - 1;
-        let mut left_bytes = budget_bytes.unwrap_or(u64::MAX);
+        let first = plan.levels().iter().all(|p| p.from.is_empty());
+        let mut left_bytes = budget_bytes.unwrap_or(if first { u64::MAX } else { FRAME_BYTES });
         let has_light = levels.has_light();
+        // The first frame is not kept waiting by levels that it does not show.
+        let finest = if first { course.finest_shown as u32 } else { 0 };
         self.wanted.clear();
-        for written in plan.levels_mut() {
+        for written in plan.levels_mut().iter().filter(|p| p.level >= finest) {
             let window = &mut windows[written.level as usize];
             let at = course.ahead.samples().map(|s| s / (1i64 << written.level) as f64);
             window.missing.by_tile(TILE, at);
@@ -165,7 +171,7 @@ impl Arrivals {
         }
         self.ask(levels);
         let faults = &mut self.faults;
-        for written in plan.levels_mut() {
+        for written in plan.levels_mut().iter_mut().filter(|p| p.level >= finest) {
             let window = &mut windows[written.level as usize];
             let at = course.eye.samples().map(|s| s / (1i64 << written.level) as f64);
             let first = window.level() == coarsest && written.from.is_empty();
@@ -214,29 +220,33 @@ impl Arrivals {
         successors: &mut [Option<Window>],
         plan: &mut UpdatePlan,
         scratch: &mut Scratch,
+        eye: &Eye,
     ) -> Result<()> {
         let faults = &mut self.faults;
-        let mut left = SUCCESSOR_SAMPLES;
+        let mut left_bytes = FRAME_BYTES;
         for written in plan.levels_mut() {
             let level = written.level as usize;
             let Some(successor) = &mut successors[level] else {
                 continue;
             };
             let mut unseen = LevelPlan::new(written.level);
+            let at = eye.samples().map(|s| s / (1i64 << written.level) as f64);
             each(successor, |window, rect| {
-                if left <= 0 {
+                let part = affordable(window, rect, at, left_bytes);
+                if part.is_empty() {
                     return Ok(rect);
                 }
-                match window.fill(levels, rect, &mut unseen, scratch, Some(&mut *faults)) {
-                    Ok(Arrival::Arrived) => left -= rect.area(),
+                match window.fill(levels, part, &mut unseen, scratch, Some(&mut *faults)) {
+                    Ok(Arrival::Arrived) => left_bytes -= bytes(window, part),
                     Ok(Arrival::Missing) => return Ok(rect),
                     // What cannot be read stays as it was drawn.
                     Err(error) if is_damage(&error) => {
-                        window.missing.lose(rect);
+                        window.missing.lose(part);
                         faults.push(error);
                     }
                     Err(error) => return Err(error),
                 }
+                rect.difference(part).for_each(|rest| window.missing.wait(rest));
                 Ok(Rect::EMPTY)
             })?;
             if successor.missing.is_empty() {

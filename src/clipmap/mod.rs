@@ -281,14 +281,7 @@ impl Clipmap {
         });
         self.eye = Some(eye);
         self.screen = Some(screen);
-        // A level shows nothing, late or not, where the camera has climbed beyond its reach. That is judged from the
-        // highest ground that there may be: the ground that its climb is measured from may itself be late.
-        let over_all_m = eye.height_m - f64::from(self.range_m[1]);
-        let mean_spacing_m = (self.grid.spacing_m[0] * self.grid.spacing_m[1]).sqrt();
-        let shown = (0..self.windows.len() - 1).filter(|level| {
-            let step_m = mean_spacing_m * (1i64 << level) as f64;
-            1.25 * over_all_m / step_m < self.ring.reach() as f64
-        });
+        let shown = self.finest_shown(&eye)..self.windows.len() - 1;
         let stale_levels = shown.clone().filter(|l| fades.held[*l]).count() as u32;
         let pops = shown.map(|l| fades.pops[l]).sum();
         let coarsest_there = self.windows[self.windows.len() - 1].missing().next().is_none();
@@ -308,6 +301,20 @@ impl Clipmap {
             provisional,
         };
         Ok(&self.report)
+    }
+
+    /// The finest level that can show anything. A level shows nothing, late or not, where the camera has climbed beyond its
+    /// reach. That is judged from the highest ground that there may be: the ground that its climb is measured from may
+    /// itself be late.
+    fn finest_shown(&self, eye: &Eye) -> usize {
+        let over_all_m = eye.height_m - f64::from(self.range_m[1]);
+        let mean_spacing_m = (self.grid.spacing_m[0] * self.grid.spacing_m[1]).sqrt();
+        let coarsest = self.windows.len() - 1;
+        let shows = |level: &usize| {
+            let step_m = mean_spacing_m * (1i64 << level) as f64;
+            1.25 * over_all_m / step_m < self.ring.reach() as f64
+        };
+        (0..coarsest).find(shows).unwrap_or(coarsest)
     }
 
     /// Where the terrain has something better than what was read so far, all of that is to be read anew.
@@ -335,6 +342,7 @@ impl Clipmap {
         let last_eye = self.last_eye.unwrap_or(samples);
         let passed_s = self.last_time_s.map_or(0.0, |last| (time_s - last).max(0.0));
         (self.last_eye, self.last_time_s) = (Some(samples), Some(time_s));
+        let finest_shown = self.finest_shown(eye);
         let (windows, plan, scratch) = (&mut self.windows, &mut self.plan, &mut self.scratch);
         if self.wait == Wait::All {
             self.arrivals.all(levels, windows, plan, scratch)?;
@@ -344,13 +352,14 @@ impl Clipmap {
         let course = Course {
             eye,
             ahead: eye.ahead(last_eye, passed_s, AHEAD_S),
+            finest_shown,
         };
         let successors = &mut self.successors;
         self.arrivals
             .some(levels, windows, successors, plan, scratch, &course, budget)?;
         if successors.iter().any(Option::is_some) {
             self.arrivals
-                .succeed(levels, windows, successors, plan, scratch)?;
+                .succeed(levels, windows, successors, plan, scratch, eye)?;
             if successors.iter().all(Option::is_none) {
                 self.has_light = levels.has_light();
                 self.range_m = range_of(&windows[windows.len() - 1]).unwrap_or(self.range_m);

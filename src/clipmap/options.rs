@@ -30,8 +30,8 @@ pub struct ClipmapOptions {
     pub max_error_px: Option<f64>,
     /// Whether frames wait for their data.
     pub wait: Wait,
-    /// The most bytes of samples that an update writes, beside the coarsest level; no limit where none. Only without
-    /// waiting.
+    /// The most bytes of samples that an update writes, beside the coarsest level; where none, as many as take about 2 ms,
+    /// and no limit for the first. Only without waiting.
     pub upload_budget_bytes: Option<u64>,
 }
 

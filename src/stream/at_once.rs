@@ -50,15 +50,16 @@ impl Terrain {
             .and_then(|folder| kept(folder, &fingerprint, progress));
         let name = fingerprint.name.clone();
         let has_heights = kept.is_some();
-        let mut terrain = match kept {
+        let kept = match kept {
             Some(file) if file.meta().light.is_some() => {
                 return Ok(Self::from_file(&name, file, &at_once.tiles));
             }
+            kept => kept,
+        };
+        let source: Arc<dyn HeightSource> = Arc::from(source::open_with(inputs, options)?);
+        let mut terrain = match kept {
             Some(file) => Self::from_file(&name, file, &at_once.tiles),
-            None => {
-                let source = source::open_with(inputs, options)?;
-                Self::draft(source.as_ref(), progress)?
-            }
+            None => Self::draft(source.as_ref(), progress)?,
         };
         if let Some(folder) = at_once.folder.as_ref().filter(|_| !has_heights) {
             progress.warn(&format!(
@@ -67,7 +68,7 @@ impl Terrain {
             ));
         }
         let plan = Plan {
-            source: Arc::from(source::open_with(inputs, options)?),
+            source,
             fingerprint,
             folder: at_once.folder.clone(),
             has_heights,
