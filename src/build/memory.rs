@@ -17,7 +17,7 @@ const BYTES_A_SAMPLE: u64 = 12;
 const BYTES_A_SAMPLE_WITH_LIGHT: u64 = 30;
 
 /// Bytes a column or row takes while light is traced: the table of a ray's crossings with cell edges.
-const BYTES_A_LINE_WITH_LIGHT: u64 = 192;
+const BYTES_A_LINE_WITH_LIGHT: u64 = 320;
 
 /// Bytes a column of level 0 takes in either pass of preprocessing: in the first two bands of the DEM (2 KiB), the rows of
 /// the coarser levels (1.4 KiB) and those under the kernels (0.2 KiB with 4 lobes); in the second the rows of the coarser
