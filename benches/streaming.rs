@@ -7,7 +7,7 @@
 //! cargo bench --bench streaming -- size      # a terrain of 2^20 x 2^20 against one of 4096 x 4096, frames in turn
 //! ```
 //!
-//! `CLIPSCAPE_TERRAIN=FILE` flies over another terrain file than one that is made of `synth:8192:1`.
+//! `CLIPSCAPE_TERRAIN=FILE` flies over another terrain file than one that is made of `synth:4096:1`.
 #![allow(clippy::print_stdout, reason = "a bench prints tables")]
 
 use std::path::{Path, PathBuf};
@@ -74,7 +74,7 @@ fn terrain_file(folder: &Path) -> Result<PathBuf> {
         }),
         ..Default::default()
     };
-    preprocess(&Synth::new(8192, 1)?, &path, &options, &Silent)?;
+    preprocess(&Synth::new(4096, 1)?, &path, &options, &Silent)?;
     Ok(path)
 }
 

@@ -479,6 +479,94 @@ fn an_interrupt_is_status_130_and_leaves_nothing() {
     assert!(names(here).is_empty(), "{:?}", names(here));
 }
 
+/// Kills at random moments: `CLIPSCAPE_KILLS=200` is the long form.
+#[cfg(unix)]
+#[test]
+fn a_kill_at_any_moment_leaves_no_file_under_the_name_and_the_next_run_cleans_up() {
+    use std::time::{Duration, Instant};
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let arguments = [
+        "preprocess",
+        "synth:1200",
+        "--no-light",
+        "-o",
+        "o.terrain.exr",
+        "--quiet",
+    ];
+    let begun = Instant::now();
+    done(here, &arguments);
+    let whole = begun.elapsed();
+    let want = fs::read(here.join("o.terrain.exr")).unwrap();
+    fs::remove_file(here.join("o.terrain.exr")).unwrap();
+    let kills = std::env::var("CLIPSCAPE_KILLS")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(8u32);
+    let (mut killed, mut seed) = (0, 17u64);
+    for n in 0..kills {
+        // Knuth's generator is random enough for moments.
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let share = (seed >> 11) as f64 / (1u64 << 53) as f64;
+        let mut child = program().args(arguments).current_dir(here).spawn().unwrap();
+        std::thread::sleep(Duration::from_secs_f64(whole.as_secs_f64() * share));
+        child.kill().unwrap();
+        let status = child.wait().unwrap();
+        let there = names(here);
+        let published = there.iter().any(|name| name == "o.terrain.exr");
+        // Whole, or not at all; a run may be killed after it has given the file its name.
+        assert!(!status.success() || published, "kill {n}, seed 17: {there:?}");
+        if published {
+            assert!(
+                fs::read(here.join("o.terrain.exr")).unwrap() == want,
+                "kill {n}, seed 17"
+            );
+            fs::remove_file(here.join("o.terrain.exr")).unwrap();
+        }
+        killed += usize::from(!published && !there.is_empty());
+        assert!(
+            there.len() < 3,
+            "kill {n}, seed 17: what was left before is not removed: {there:?}"
+        );
+    }
+    assert!(killed > 0, "no kill met a run at its work");
+    done(here, &arguments);
+    if cfg!(target_os = "linux") {
+        assert_eq!(names(here), ["o.terrain.exr"]);
+    }
+    assert!(fs::read(here.join("o.terrain.exr")).unwrap() == want);
+    done(here, &["info", "o.terrain.exr", "--verify", "--quiet"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_source_that_is_cut_short_or_gone_gets_one_line_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    done(here, &["synth", "600", "-o", "a.tif", "--quiet"]);
+    // The samples are cut off after the header: what vanished is found only while it is read.
+    let file = fs::OpenOptions::new()
+        .write(true)
+        .open(here.join("a.tif"))
+        .unwrap();
+    file.set_len(file.metadata().unwrap().len() / 2).unwrap();
+    fails(
+        here,
+        1,
+        &["preprocess", "a.tif", "--no-light", "-o", "o.terrain.exr"],
+        &["a.tif"],
+    );
+    fails(
+        here,
+        1,
+        &["preprocess", "b.tif", "-o", "o.terrain.exr"],
+        &["b.tif"],
+    );
+    assert_eq!(names(here), ["a.tif"]);
+}
+
 #[cfg(feature = "gpu")]
 #[test]
 fn render_refuses_at_once_what_it_could_only_spoil() {

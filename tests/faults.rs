@@ -244,6 +244,9 @@ fn harmed(path: &Path, truth: &dyn Levels, harm: impl FnOnce(&Path)) -> (Vec<Err
     (faults, coarse)
 }
 
+/// What is done to a file, whether it hurts, and how.
+type Case<'a> = (&'a str, bool, &'a dyn Fn(&Path));
+
 #[test]
 fn a_file_may_be_cut_overwritten_replaced_or_removed_during_a_flight() {
     let folder = tempfile::tempdir().unwrap();
@@ -253,7 +256,7 @@ fn a_file_may_be_cut_overwritten_replaced_or_removed_during_a_flight() {
     let whole = bytes_of(&path);
     let truth = TerrainFile::open("truth", whole.clone()).unwrap();
     let open = || OpenOptions::new().write(true).open(&path).unwrap();
-    let cases: [(&str, bool, &dyn Fn(&Path)); 5] = [
+    let cases: [Case<'_>; 5] = [
         ("cut to nothing", true, &|_| open().set_len(0).unwrap()),
         ("cut", true, &|_| open().set_len(whole.len() as u64 / 3).unwrap()),
         ("overwritten", true, &|_| {

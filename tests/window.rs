@@ -413,6 +413,11 @@ fn without_a_display_one_line_says_what_to_do_instead() {
         (&["synth:64", "--output-dir", "missing"], 1, "missing"),
         (&["synth:64", "--clip-size", "auto"], 2, "--clip-size"),
         (&["synth:64", "--stats", "a"], 2, "--stats"),
+        (
+            &["synth:64", "--wait", "all", "--upload-budget", "1M"],
+            2,
+            "upload budget",
+        ),
     ] {
         let (code, said) = run(arguments);
         assert_eq!(code, Some(status), "{arguments:?}: {said}");

@@ -115,7 +115,7 @@ fn clipmap_options(args: &FlyArgs) -> Result<ClipmapOptions> {
         cull: !view.no_cull,
         max_error_px: view.max_error_px,
         wait: view.wait,
-        upload_budget_bytes: view.upload_budget.filter(|_| view.wait == Wait::None),
+        upload_budget_bytes: view.upload_budget,
     };
     options.check()?;
     Ok(options)

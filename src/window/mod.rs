@@ -1,10 +1,10 @@
 //! The window: terrain to fly through, with a panel of figures and dials over it.
 //!
-//! It is built over the same face that an embedding program uses. Each frame, [`motion`] moves the camera by what
-//! [`controls`] understands of keys and pointer, [`scene`] updates the clipmap and draws it into a texture of the
-//! window's size, and [`overlay`] lays the [`panel`] over it. A terrain is opened by [`loading`] on a thread of its own, so
-//! the window is there at once; [`measured`] finds errors on another. [`recorder`] keeps the flight, [`files`] finds names
-//! for what is written, [`graphics`] holds the device and the surface, and [`app`] is what the window's system calls.
+//! It is built over the same face that an embedding program uses. Each frame, `motion` moves the camera by what
+//! `controls` understands of keys and pointer, `scene` updates the clipmap and draws it into a texture of the
+//! window's size, and `overlay` lays the `panel` over it. A terrain is opened by `loading` on a thread of its own, so
+//! the window is there at once; `measured` finds errors on another. `recorder` keeps the flight, `files` finds names
+//! for what is written, `graphics` holds the device and the surface, and `app` is what the window's system calls.
 
 mod app;
 mod controls;
