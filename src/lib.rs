@@ -19,6 +19,7 @@
 //!    constants of [`shade`].
 //! 10. [`render`] makes headless frames of it: pictures, contact sheets, animations, statistics.
 //! 11. [`measure`] flies many settings and reports what each costs and how wrong it is.
+//! 12. [`window`] flies through it on a screen.
 //!
 //! Underneath all: [`grid`] is the only index arithmetic, [`error::Error`] the only error, [`camera`] says what is
 //! seen. Each room knows those above it in this file and none below.
@@ -67,6 +68,9 @@ pub mod render;
 
 #[cfg(feature = "gpu")]
 pub mod measure;
+
+#[cfg(feature = "window")]
+pub mod window;
 
 #[cfg(feature = "cli")]
 pub mod cli;

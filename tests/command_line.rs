@@ -288,27 +288,103 @@ fn info_says_what_a_terrain_file_is_and_verify_finds_what_is_damaged() {
 }
 
 #[test]
-fn a_terrain_file_is_not_preprocessed_again() {
+fn a_terrain_file_is_lit_anew() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    done(
-        here,
-        &[
+    let make = |input: &str, output: &str, more: &[&str]| {
+        let arguments = [
             "preprocess",
-            "synth:64",
-            "--no-light",
+            input,
             "--quiet",
+            "--sky-directions",
+            "2",
             "-o",
-            "a.terrain.exr",
-        ],
+            output,
+        ];
+        done(here, &[&arguments[..], more].concat());
+    };
+    make("synth:64", "a.terrain.exr", &[]);
+    make("synth:64", "low.terrain.exr", &["--sun", "90,5"]);
+    make("a.terrain.exr", "b.terrain.exr", &["--sun", "90,5"]);
+    let bytes = |name: &str| fs::read(here.join(name)).unwrap();
+    assert_eq!(bytes("b.terrain.exr"), bytes("low.terrain.exr"));
+    assert_ne!(bytes("b.terrain.exr"), bytes("a.terrain.exr"));
+    // In its own place where that is forced, and with the filter that it has.
+    let in_place = ["preprocess", "b.terrain.exr"];
+    fails(here, 1, &in_place, &["b.terrain.exr", "--force"]);
+    let filter = ["preprocess", "b.terrain.exr", "--filter", "box", "--force"];
+    fails(here, 1, &filter, &["filter is fixed"]);
+    assert_eq!(bytes("b.terrain.exr"), bytes("low.terrain.exr"));
+    make("b.terrain.exr", "b.terrain.exr", &["--force"]);
+    assert_eq!(bytes("b.terrain.exr"), bytes("a.terrain.exr"));
+    assert_eq!(names(here), ["a.terrain.exr", "b.terrain.exr", "low.terrain.exr"]);
+}
+
+#[test]
+fn the_sun_comes_from_a_time_and_a_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/data/N42E001.hgt");
+    let at = ["--sun-at", "2026-06-21T09:00:00Z"];
+    let preprocess = |input, output, more: &[&str]| {
+        let arguments = [
+            "preprocess",
+            input,
+            "--quiet",
+            "--sky-directions",
+            "0",
+            "-o",
+            output,
+        ];
+        run(here, &[&arguments[..], &at[..], more].concat())
+    };
+    let sun = |name: &str| {
+        let info = done(here, &["info", name, "--json"]);
+        let info: serde_json::Value = serde_json::from_str(&info).unwrap();
+        info["light"]["sun"].clone()
+    };
+    // The middle of the shipped DEM is 42.5 north, 1.5 east.
+    assert_eq!(preprocess(shipped, "a.terrain.exr", &[]).status, 0);
+    let place = ["--lat", "42.5", "--lon", "1.5"];
+    assert_eq!(preprocess("synth:32", "b.terrain.exr", &place).status, 0);
+    let elsewhere = ["--lat", "-42.5", "--lon", "1.5"];
+    assert_eq!(preprocess("synth:32", "c.terrain.exr", &elsewhere).status, 0);
+    assert_eq!(sun("a.terrain.exr"), sun("b.terrain.exr"));
+    assert_ne!(sun("a.terrain.exr"), sun("c.terrain.exr"));
+
+    let nowhere = preprocess("synth:32", "d.terrain.exr", &[]);
+    assert!(
+        nowhere.status == 1 && nowhere.err.contains("give --lat and --lon"),
+        "{}",
+        nowhere.err
     );
-    fails(
-        here,
-        1,
-        &["preprocess", "a.terrain.exr", "-o", "b.terrain.exr"],
-        &["terrain file already"],
+    let no_earth = preprocess(
+        "synth:32",
+        "d.terrain.exr",
+        &["--lat", "1", "--lon", "2", "--curvature"],
     );
-    assert_eq!(names(here), ["a.terrain.exr"]);
+    assert!(
+        no_earth.status == 1 && no_earth.err.contains("no known earth"),
+        "{}",
+        no_earth.err
+    );
+    for wrong in [
+        &["--sun-at", "noon"][..],
+        &["--sun", "1,2", "--sun-at", "2026-06-21T09:00:00Z"],
+        &["--lat", "3", "--lon", "4"],
+        &["--sun-at", "2026-06-21T09:00:00Z", "--lat", "3"],
+        &["--sun-at", "2026-06-21T09:00:00Z", "--lat", "93", "--lon", "4"],
+        &["--curvature=1"],
+        &["--curvature", "--no-light"],
+    ] {
+        fails(
+            here,
+            2,
+            &[&["preprocess", "synth:32"][..], wrong].concat(),
+            &["clipscape"],
+        );
+    }
+    assert_eq!(names(here), ["a.terrain.exr", "b.terrain.exr", "c.terrain.exr"]);
 }
 
 #[cfg(feature = "dem")]
@@ -400,6 +476,94 @@ fn an_interrupt_is_status_130_and_leaves_nothing() {
     assert_eq!(output.status.code(), Some(130), "{err}");
     assert!(err.lines().count() == 1 && err.contains("interrupted"), "{err}");
     assert!(names(here).is_empty(), "{:?}", names(here));
+}
+
+/// Kills at random moments: `CLIPSCAPE_KILLS=200` is the long form.
+#[cfg(unix)]
+#[test]
+fn a_kill_at_any_moment_leaves_no_file_under_the_name_and_the_next_run_cleans_up() {
+    use std::time::{Duration, Instant};
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let arguments = [
+        "preprocess",
+        "synth:1200",
+        "--no-light",
+        "-o",
+        "o.terrain.exr",
+        "--quiet",
+    ];
+    let begun = Instant::now();
+    done(here, &arguments);
+    let whole = begun.elapsed();
+    let want = fs::read(here.join("o.terrain.exr")).unwrap();
+    fs::remove_file(here.join("o.terrain.exr")).unwrap();
+    let kills = std::env::var("CLIPSCAPE_KILLS")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(8u32);
+    let (mut killed, mut seed) = (0, 17u64);
+    for n in 0..kills {
+        // Knuth's generator is random enough for moments.
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let share = (seed >> 11) as f64 / (1u64 << 53) as f64;
+        let mut child = program().args(arguments).current_dir(here).spawn().unwrap();
+        std::thread::sleep(Duration::from_secs_f64(whole.as_secs_f64() * share));
+        child.kill().unwrap();
+        let status = child.wait().unwrap();
+        let there = names(here);
+        let published = there.iter().any(|name| name == "o.terrain.exr");
+        // Whole, or not at all; a run may be killed after it has given the file its name.
+        assert!(!status.success() || published, "kill {n}, seed 17: {there:?}");
+        if published {
+            assert!(
+                fs::read(here.join("o.terrain.exr")).unwrap() == want,
+                "kill {n}, seed 17"
+            );
+            fs::remove_file(here.join("o.terrain.exr")).unwrap();
+        }
+        killed += usize::from(!published && !there.is_empty());
+        assert!(
+            there.len() < 3,
+            "kill {n}, seed 17: what was left before is not removed: {there:?}"
+        );
+    }
+    assert!(killed > 0, "no kill met a run at its work");
+    done(here, &arguments);
+    if cfg!(target_os = "linux") {
+        assert_eq!(names(here), ["o.terrain.exr"]);
+    }
+    assert!(fs::read(here.join("o.terrain.exr")).unwrap() == want);
+    done(here, &["info", "o.terrain.exr", "--verify", "--quiet"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_source_that_is_cut_short_or_gone_gets_one_line_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    done(here, &["synth", "600", "-o", "a.tif", "--quiet"]);
+    // The samples are cut off after the header: what vanished is found only while it is read.
+    let file = fs::OpenOptions::new()
+        .write(true)
+        .open(here.join("a.tif"))
+        .unwrap();
+    file.set_len(file.metadata().unwrap().len() / 2).unwrap();
+    fails(
+        here,
+        1,
+        &["preprocess", "a.tif", "--no-light", "-o", "o.terrain.exr"],
+        &["a.tif"],
+    );
+    fails(
+        here,
+        1,
+        &["preprocess", "b.tif", "-o", "o.terrain.exr"],
+        &["b.tif"],
+    );
+    assert_eq!(names(here), ["a.tif"]);
 }
 
 #[cfg(feature = "gpu")]

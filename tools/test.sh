@@ -9,6 +9,13 @@ cd -- "$(dirname -- "$0")/.."
 cargo fmt --version >/dev/null 2>&1 || rustup component add rustfmt
 cargo clippy --version >/dev/null 2>&1 || rustup component add clippy
 
+# The window is tested on a screen without a monitor, where there can be one.
+if [ "$(uname -s)" = Linux ] && command -v apt-get >/dev/null 2>&1 &&
+    ! { command -v Xvfb && command -v xdotool; } >/dev/null 2>&1; then
+    (clipscape_install 'the window is tested under Xvfb' \
+        xvfb xdotool libxkbcommon-x11-0 libxcursor1 libxi6 libxrandr2) || true
+fi
+
 step() {
     printf '\n== %s\n' "$*" >&2
     "$@"

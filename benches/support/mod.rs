@@ -2,6 +2,8 @@
 #![allow(unreachable_pub, reason = "a module of benches has no outside")]
 #![allow(dead_code, reason = "each bench uses its own part of this")]
 
+pub mod mesh;
+
 use std::time::Instant;
 
 use clipscape::clipmap::ClipmapOptions;
@@ -51,25 +53,9 @@ pub struct Targets {
 
 impl Targets {
     pub fn new(gpu: &Gpu, size_px: [u32; 2]) -> Self {
-        let texture = |format| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("clipscape bench target"),
-                size: wgpu::Extent3d {
-                    width: size_px[0],
-                    height: size_px[1],
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            })
-        };
         Self {
-            colour: texture(COLOUR_FORMAT),
-            depth: texture(DEPTH_FORMAT),
+            colour: gpu.target("clipscape bench colour", size_px, COLOUR_FORMAT),
+            depth: gpu.target("clipscape bench depth", size_px, DEPTH_FORMAT),
             gpu: gpu.clone(),
         }
     }

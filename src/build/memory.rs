@@ -2,6 +2,7 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Size};
+use crate::terrain::layout::TILE;
 
 /// The ceiling of preprocessing unless another is given: 512 MiB.
 pub const DEFAULT_MEMORY_BYTES: u64 = 512 << 20;
@@ -16,12 +17,15 @@ const BYTES_A_SAMPLE: u64 = 12;
 const BYTES_A_SAMPLE_WITH_LIGHT: u64 = 30;
 
 /// Bytes a column or row takes while light is traced: the table of a ray's crossings with cell edges.
-const BYTES_A_LINE_WITH_LIGHT: u64 = 192;
+const BYTES_A_LINE_WITH_LIGHT: u64 = 320;
 
 /// Bytes a column of level 0 takes in either pass of preprocessing: in the first two bands of the DEM (2 KiB), the rows of
 /// the coarser levels (1.4 KiB) and those under the kernels (0.2 KiB with 4 lobes); in the second the rows of the coarser
 /// levels (1.4 KiB) and of bounds (1.7 KiB), and while these are packed some of them twice.
 const BYTES_A_COLUMN: u64 = 4096;
+
+/// Bytes a tile of level 0 takes: its place in the file and its checks, twice, and those of the tiles above it.
+const BYTES_A_TILE: u64 = 64;
 
 /// What does not depend on the DEM: the program, and tiles being compressed.
 const FIXED_BYTES: u64 = 64 << 20;
@@ -40,10 +44,12 @@ pub fn needed_bytes(grid: &Grid, light: bool) -> u64 {
 }
 
 /// The memory that preprocessing a DEM of `grid` takes, in bytes, where its source holds `held_bytes`: whatever its
-/// height, unless light is traced, for which level 0 and its light are held.
+/// height but for 64 bytes a tile, unless light is traced, for which level 0 and its light are held.
 pub fn preprocess_bytes(grid: &Grid, light: bool, held_bytes: u64) -> u64 {
+    let tiles = grid.size.samples() as u64 / (TILE * TILE) as u64;
     let passes = (grid.size.width as u64)
         .saturating_mul(BYTES_A_COLUMN)
+        .saturating_add(tiles * BYTES_A_TILE)
         .saturating_add(FIXED_BYTES);
     let light = if light { needed_bytes(grid, true) } else { 0 };
     passes.max(light).saturating_add(held_bytes)
@@ -118,10 +124,11 @@ mod tests {
     }
 
     #[test]
-    fn without_light_the_height_of_a_dem_costs_nothing() {
+    fn without_light_the_height_of_a_dem_costs_next_to_nothing() {
         let of = |width, height| preprocess_bytes(&Grid::new(width, height, [1.0, 1.0]), false, 7);
-        assert_eq!(of(1000, 1), of(1000, 1 << 30));
-        assert_eq!(of(65_536, 1), (64 << 20) + 65_536 * 4096 + 7);
+        assert_eq!(of(1000, 1 << 20) - of(1000, 1), (1000 << 20) / 65_536 * 64);
+        assert_eq!(of(65_536, 1), (64 << 20) + 65_536 * 4096 + 64 + 7);
+        assert!(of(65_536, 65_536) < 512 << 20);
     }
 
     #[test]

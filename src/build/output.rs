@@ -1,4 +1,9 @@
 //! A file that appears whole or not at all: written beside its target, synced, renamed.
+//!
+//! Until then it is called `.NAME.PLACE-PROCESS-COUNT.part`. A process that is killed leaves it; whoever next makes a
+//! file of the same name removes what processes left that are no more. That they are no more is known only of those
+//! whose numbers count where we run: PLACE is a check of the system's boot and of the numbering of processes (Linux).
+//! Elsewhere nothing is known, and nothing removed.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -47,9 +52,12 @@ impl Output {
             Err(e) => return Err(Error::io(target.display(), e)),
         }
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        let mut temporary_name = std::ffi::OsString::from(".");
-        temporary_name.push(name);
-        temporary_name.push(format!(".{}-{count}.part", std::process::id()));
+        let mut before = std::ffi::OsString::from(".");
+        before.push(name);
+        before.push(format!(".{:08x}-", place().unwrap_or_default()));
+        remove_leftovers(target, &before);
+        let mut temporary_name = before;
+        temporary_name.push(format!("{}-{count}.part", std::process::id()));
         let temporary = target.with_file_name(temporary_name);
         // Readable too, so that its maker can check it before it is published.
         let file = OpenOptions::new()
@@ -136,6 +144,42 @@ pub fn refuse_existing(target: &Path) -> Result<()> {
     }
 }
 
+/// A check of where a process's number means the same process: one boot of one system, one numbering.
+fn place() -> Option<u32> {
+    let boot = fs::read("/proc/sys/kernel/random/boot_id").ok()?;
+    let numbering = fs::read_link("/proc/self/ns/pid").ok()?;
+    let check = crc32c::crc32c(&boot);
+    Some(crc32c::crc32c_append(
+        check,
+        numbering.as_os_str().as_encoded_bytes(),
+    ))
+}
+
+/// Removes what processes that are no more left beside `target`, whose names begin with `before`. What cannot be removed
+/// stays.
+fn remove_leftovers(target: &Path, before: &std::ffi::OsStr) {
+    if place().is_none() {
+        return;
+    }
+    let folder = target.parent().filter(|f| !f.as_os_str().is_empty());
+    let Ok(entries) = fs::read_dir(folder.unwrap_or(Path::new("."))) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let process = name
+            .as_encoded_bytes()
+            .strip_prefix(before.as_encoded_bytes())
+            .and_then(|rest| rest.strip_suffix(b".part"))
+            .and_then(|rest| std::str::from_utf8(rest).ok())
+            .and_then(|rest| rest.split_once('-'))
+            .and_then(|(process, _)| process.parse::<u32>().ok());
+        if process.is_some_and(|p| !Path::new(&format!("/proc/{p}")).exists()) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
 fn exists(target: &Path) -> Error {
     Error::new(ErrorKind::Misuse, target.display(), "exists already")
         .advice("use --force to replace it, or choose another name")
@@ -165,6 +209,36 @@ mod tests {
         assert_eq!(names(folder.path()), ["a.exr"]);
         drop(Output::create(&target, true).unwrap());
         assert_eq!(names(folder.path()), ["a.exr"]);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_a_killed_process_left_is_removed_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("a.exr");
+        let mut child = std::process::Command::new("true").spawn().unwrap();
+        let gone = child.id();
+        child.wait().unwrap();
+        let here = place().unwrap();
+        let own = std::process::id();
+        let left = format!(".a.exr.{here:08x}-{gone}-0.part");
+        // Of a process that lives, of another boot or machine, of another target, and no such file at all.
+        let others = [
+            format!(".a.exr.{here:08x}-{own}-77.part"),
+            format!(".a.exr.{:08x}-{gone}-0.part", !here),
+            format!(".b.exr.{here:08x}-{gone}-0.part"),
+            format!(".a.exr.{here:08x}-{gone}x-0.part"),
+            "a.exr.part".into(),
+        ];
+        for name in others.iter().chain([&left]) {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        drop(Output::create(&target, false).unwrap());
+        let mut found = names(folder.path());
+        found.sort_unstable();
+        let mut want = others.to_vec();
+        want.sort_unstable();
+        assert_eq!(found, want);
     }
 
     #[test]

@@ -162,6 +162,8 @@ pub fn preprocess(
 
         let name = out.display().to_string();
         let heights = writer.readable(&name, &meta, || source::open_file(output.temporary()))?;
+        // Each pass reads a tile once.
+        let heights = heights.with_cache(0);
         let took = write_bounds(&heights, &mut writer, &threads, progress)?;
         report.bounds_s = took.bounds_s;
         report.write_s += took.write_s;

@@ -22,6 +22,9 @@ use crate::work::Serial;
 struct Hills {
     description: Description,
     breaks_at: i64,
+    /// Voids in a hundred samples; beside those none where x is below `coast`.
+    voids: i64,
+    coast: i64,
 }
 
 impl Hills {
@@ -39,6 +42,8 @@ impl Hills {
         Self {
             description,
             breaks_at: i64::MAX,
+            voids: 3,
+            coast: 0,
         }
     }
 }
@@ -55,7 +60,7 @@ impl HeightSource for Hills {
         for ((x, z), out) in rect.cells().zip(out) {
             let random = Random::new((x * 7919 + z * 104_729) as u64).below(100);
             let hill = 800.0 * (x as f32 / 40.0).sin() * (z as f32 / 55.0).cos();
-            *out = if random < 3 {
+            *out = if random < self.voids || x < self.coast + 9 * (z / 7 % 5) * self.coast.signum() {
                 f32::NAN
             } else {
                 (hill + random as f32).round()
@@ -134,6 +139,99 @@ fn a_file_holds_what_the_pyramid_holds() {
             ];
             assert!(parts.iter().all(|s| *s >= 0.0) && parts.iter().sum::<f64>() <= report.total_s + 1e-6);
         }
+    }
+}
+
+/// The bytes of a streamed file, and of one that the plain version in memory writes.
+fn streamed_and_plain(hills: &Hills, options: &PreprocessOptions) -> (Vec<u8>, Vec<u8>) {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("a.terrain.exr");
+    preprocess(hills, &out, options, &Silent).unwrap();
+    let pyramid = build_pyramid(hills, &options.filter, &Silent).unwrap();
+    let plain = std::io::Cursor::new(Vec::new());
+    let plain = crate::terrain::write(plain, open(&out).meta(), &pyramid, &Serial, &Silent).unwrap();
+    (fs::read(out).unwrap(), plain.into_inner())
+}
+
+#[test]
+fn any_ceiling_and_any_threads_give_the_bytes_of_the_plain_version() {
+    let sizes = [
+        (1, 1),
+        (1, 900),
+        (900, 1),
+        (2, 3),
+        (256, 256),
+        (257, 513),
+        (513, 257),
+        (1013, 300),
+        (13201, 20),
+        (20, 5000),
+        (600, 1400),
+    ];
+    for (width, height) in sizes {
+        for (voids, coast) in [(0, 0), (30, 0), (3, 40)] {
+            let hills = Hills {
+                voids,
+                coast,
+                ..Hills::new(width, height)
+            };
+            let lowest = preprocess_bytes(&hills.description.grid, false, 0);
+            let mut first = None;
+            for (threads, memory_bytes) in [(1, lowest), (2, lowest), (1, 4 << 30), (2, 4 << 30)] {
+                let options = PreprocessOptions {
+                    light: None,
+                    memory_bytes,
+                    ..options(threads)
+                };
+                let case = format!("{width} x {height}, voids {voids}, coast {coast}, {threads} threads");
+                let (streamed, plain) = streamed_and_plain(&hills, &options);
+                assert!(streamed == plain, "{case}");
+                assert!(
+                    streamed == *first.get_or_insert(plain),
+                    "{case}, {memory_bytes} bytes"
+                );
+            }
+        }
+    }
+    // Controls: another filter and other voids give other bytes.
+    let hills = Hills::new(300, 300);
+    let options = |filter: FilterKind| PreprocessOptions {
+        light: None,
+        filter: filter.into(),
+        ..options(1)
+    };
+    let (one, _) = streamed_and_plain(&hills, &options(FilterKind::default()));
+    let (other, _) = streamed_and_plain(&hills, &options(FilterKind::Cubic));
+    let holed = Hills {
+        voids: 4,
+        ..Hills::new(300, 300)
+    };
+    let (third, _) = streamed_and_plain(&holed, &options(FilterKind::default()));
+    assert!(one != other && one != third);
+}
+
+#[test]
+fn the_share_of_voids_stays_from_level_to_level() {
+    let hills = Hills {
+        voids: 30,
+        ..Hills::new(1501, 1201)
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("a.terrain.exr");
+    let options = PreprocessOptions {
+        light: None,
+        ..options(2)
+    };
+    preprocess(&hills, &out, &options, &Silent).unwrap();
+    let file = open(&out);
+    for level in 0..4 {
+        let size = file.grid().level(level);
+        let mut heights = vec![0.0; size.samples() as usize];
+        let _ = file.heights(level, size.rect(), &mut heights).unwrap();
+        let share = heights.iter().filter(|h| h.is_nan()).count() as f64 / heights.len() as f64;
+        // Four standard deviations of a random share; a rule that spreads voids would leave none or nearly all.
+        let allowed = 4.0 * (0.21 / heights.len() as f64).sqrt();
+        assert!((share - 0.3).abs() < allowed, "level {level}: {share}");
     }
 }
 
@@ -256,7 +354,7 @@ fn errors_are_one_line_and_leave_nothing() {
     };
     let error = error_of(&whole, &out, &little);
     assert_eq!(error.kind(), ErrorKind::Limit);
-    let needed = needed_bytes(&whole.description.grid, true).div_ceil(1 << 20);
+    let needed = preprocess_bytes(&whole.description.grid, true, 0).div_ceil(1 << 20);
     assert!(
         error.to_string().contains(&format!("need {needed} MiB")),
         "{error}"

@@ -1,6 +1,8 @@
 //! What may be typed: commands, their options, and the help of each.
 
 mod cache;
+#[cfg(feature = "window")]
+mod fly;
 mod input;
 #[cfg(feature = "gpu")]
 mod measure;
@@ -12,11 +14,13 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub(super) use self::cache::{CacheAction, CacheArgs};
+#[cfg(feature = "window")]
+pub(super) use self::fly::FlyArgs;
 pub(super) use self::input::InputArgs;
 #[cfg(feature = "gpu")]
 pub(super) use self::measure::MeasureArgs;
 #[cfg(feature = "gpu")]
-pub(super) use self::render::{RenderArgs, ViewArgs};
+pub(super) use self::render::{CameraArgs, RenderArgs, ViewArgs};
 use super::values;
 #[cfg(feature = "dem")]
 use crate::build::PartKind;
@@ -43,6 +47,8 @@ pub(super) enum Command {
     Preprocess(PreprocessArgs),
     #[cfg(feature = "gpu")]
     Render(Box<RenderArgs>),
+    #[cfg(feature = "window")]
+    Fly(Box<FlyArgs>),
     #[cfg(feature = "gpu")]
     Measure(Box<MeasureArgs>),
     Cache(CacheArgs),
@@ -118,7 +124,7 @@ pub(super) struct PreprocessArgs {
     #[arg(long, value_name = "NAME", value_parser = values::filter(), hide_possible_values = true)]
     pub(super) filter: Option<FilterKind>,
 
-    /// Refuse a DEM that needs more memory than this, as in 512M or 2GiB
+    /// Refuse a DEM that needs more memory than this, as in 512M or 2GiB [default: 512M]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes)]
     pub(super) memory: Option<u64>,
 

@@ -5,6 +5,8 @@ mod args;
 mod cache;
 #[cfg(feature = "dem")]
 mod export;
+#[cfg(feature = "window")]
+mod fly;
 mod info;
 mod input;
 #[cfg(feature = "gpu")]
@@ -59,6 +61,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Preprocess(args) => preprocess::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "gpu")]
         Command::Render(args) => render::run(&args, &Terminal::new(args.quiet)),
+        #[cfg(feature = "window")]
+        Command::Fly(args) => fly::run(&args, &Terminal::new(args.quiet)),
         #[cfg(feature = "gpu")]
         Command::Measure(args) => measure::run(&args, &Terminal::new(args.quiet)),
         Command::Cache(args) => cache::run(&args, &Terminal::new(args.quiet)),

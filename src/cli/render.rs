@@ -76,7 +76,7 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     let terrain = Arc::new(open(args, folder.clone(), &tiles, terminal)?);
     warn_of_sun(args, &terrain, terminal);
     let flight = flight.map(|flight| flight.over(&terrain)).transpose()?;
-    let camera = camera(args, &terrain)?;
+    let camera = camera(&args.camera, args.view.vertical_scale, &terrain)?;
     let scale = args.view.vertical_scale;
     let heights = height_range_m(terrain.as_ref())?.map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
     let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
@@ -334,8 +334,8 @@ pub(super) fn read_flight(path: &Path) -> Result<(String, String)> {
 /// and the camera a distance D away, steps of `1.25 D / R` remain. They are to be about two pixels of the picture,
 /// `2 D tan(fov/2) / height` each, at the overview's 45 degrees: N = 1.5 times the picture's height.
 fn clip_size(args: &RenderArgs) -> i64 {
-    let whole = args.eye.is_none()
-        && args.eye_at.is_none()
+    let whole = args.camera.eye.is_none()
+        && args.camera.eye_at.is_none()
         && args.flight.as_deref().is_none_or(|f| f == Path::new("orbit"));
     match args.view.clip_size {
         Some(ClipSize::Fixed(asked)) => asked,
@@ -369,7 +369,7 @@ fn clipmap_options(args: &RenderArgs) -> Result<ClipmapOptions> {
     Ok(options)
 }
 
-fn tile_options(view: &ViewArgs) -> Result<TileOptions> {
+pub(super) fn tile_options(view: &ViewArgs) -> Result<TileOptions> {
     let defaults = TileOptions::default();
     let options = TileOptions {
         memory_bytes: view.memory.map_or(defaults.memory_bytes, |b| {

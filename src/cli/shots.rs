@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::args::RenderArgs;
+use super::args::{CameraArgs, RenderArgs};
 use crate::camera::{Camera, CrsFlight, Flight, View, is_crs};
 use crate::error::Result;
 use crate::query::Places;
@@ -69,7 +69,7 @@ impl Planned {
 }
 
 /// The camera that is asked for, if one is.
-pub(super) fn camera(args: &RenderArgs, terrain: &Terrain) -> Result<Option<Camera>> {
+pub(super) fn camera(args: &CameraArgs, vertical_scale: f64, terrain: &Terrain) -> Result<Option<Camera>> {
     let places = || Places::new(terrain, terrain.place(), terrain.name());
     let eye: DVec3 = match (args.eye, args.eye_at) {
         (Some(eye), _) => eye.into(),
@@ -79,7 +79,7 @@ pub(super) fn camera(args: &RenderArgs, terrain: &Terrain) -> Result<Option<Came
     let (mut heading_deg, mut pitch_deg) = (args.heading.unwrap_or(0.0), args.pitch.unwrap_or(0.0));
     if let Some(at) = args.look_at {
         // As drawn: directions are those of the scaled world.
-        let drawn = DVec3::new(1.0, args.view.vertical_scale, 1.0);
+        let drawn = DVec3::new(1.0, vertical_scale, 1.0);
         (heading_deg, pitch_deg) = Camera::toward(eye * drawn, places()?.ground(at)? * drawn);
     }
     Ok(Some(Camera {

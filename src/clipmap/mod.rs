@@ -101,6 +101,7 @@ pub struct Clipmap {
     vertical_scale: f64,
     cull: bool,
     max_error_px: Option<f64>,
+    levels_asked: Option<u32>,
     cut: bool,
     has_light: bool,
     range_m: [f32; 2],
@@ -150,6 +151,7 @@ impl Clipmap {
             vertical_scale: options.vertical_scale,
             cull: options.cull,
             max_error_px: options.max_error_px,
+            levels_asked: options.levels,
             cut: count < fitting,
             has_light: levels.has_light(),
             range_m: height_range_m(levels)?,
@@ -173,6 +175,30 @@ impl Clipmap {
             arrivals: Arrivals::default(),
             report: UpdateReport::default(),
         })
+    }
+
+    /// Takes over from `options` what can change without reading anything anew, from the next update on: transition,
+    /// vertical scale, culling, the promised error and the budget. False, and nothing changed, where they ask for another
+    /// clip size or other levels, for a promise where none was or none where one was, or for waiting where it did not or
+    /// the reverse: that takes a clipmap of its own.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] for options out of range.
+    pub fn adopt(&mut self, options: &ClipmapOptions) -> Result<bool> {
+        options.check()?;
+        let ring = options.ring()?;
+        let same = ring.clip_size == self.ring.clip_size
+            && options.max_error_px.is_some() == self.max_error_px.is_some()
+            && options.wait == self.wait
+            && options.levels == self.levels_asked;
+        if same {
+            self.ring = ring;
+            self.vertical_scale = options.vertical_scale;
+            self.cull = options.cull;
+            self.max_error_px = options.max_error_px;
+            self.upload_budget_bytes = options.upload_budget_bytes;
+        }
+        Ok(same)
     }
 
     /// Moves the windows to where the view's eye is, reading what that exposes, and selects what to draw.

@@ -16,7 +16,7 @@
 //!
 //! *It keeps the promise.* A patch that is drawn unrefined for need alone has corners of 1, thus q' of at most 0.7, and
 //! where it morphs, for need, its parent has q' below 0.9. Morphing per vertex adds at most half the change of alpha
-//! across a cell times the sum of both errors, see [`super::certificate`]; the field changes by at most `1 - (15/16)^2`
+//! across a cell times the sum of both errors, see `stray.rs`; the field changes by at most `1 - (15/16)^2`
 //! across one: below `0.0606 (0.9 / 1.3 + 0.9) = 0.097`. So what is certified of it is below `0.9 + 0.097`.
 //!
 //! *It is continuous* in eye and rotation, as [`Screen`] is. Where bounds have not arrived need is 0; by then the field's

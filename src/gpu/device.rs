@@ -33,6 +33,18 @@ impl Gpu {
 /// # Errors
 /// [`ErrorKind::Device`] where there is no adapter or it gives no device.
 pub fn open() -> Result<Gpu> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    open_for(&instance, None).map(|(gpu, _)| gpu)
+}
+
+/// The same of an instance of the caller's, able to draw into `surface` where one is given, with its adapter.
+///
+/// # Errors
+/// As [`open`].
+pub(crate) fn open_for(
+    instance: &wgpu::Instance,
+    surface: Option<&wgpu::Surface<'_>>,
+) -> Result<(Gpu, wgpu::Adapter)> {
     let none = |cause: &dyn std::error::Error| {
         let what = format!(
             "no usable Vulkan, Metal or Direct3D 12 adapter ({})",
@@ -42,9 +54,9 @@ pub fn open() -> Result<Gpu> {
             "install a Vulkan driver; mesa-vulkan-drivers on Debian has one that needs no graphics card",
         )
     };
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let options = wgpu::RequestAdapterOptions {
         power_preference: wgpu::PowerPreference::HighPerformance,
+        compatible_surface: surface,
         ..Default::default()
     };
     let adapter = pollster::block_on(instance.request_adapter(&options)).map_err(|e| none(&e))?;
@@ -56,11 +68,12 @@ pub fn open() -> Result<Gpu> {
         ..Default::default()
     };
     let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| none(&e))?;
-    Ok(Gpu {
+    let gpu = Gpu {
         device,
         queue,
         info: adapter.get_info(),
-    })
+    };
+    Ok((gpu, adapter))
 }
 
 /// The beginning of a library's message, without the list of all that it tried.

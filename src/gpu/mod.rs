@@ -12,6 +12,8 @@ mod sky;
 mod staging;
 mod textures;
 
+#[cfg(feature = "window")]
+pub(crate) use device::open_for;
 pub use device::{Gpu, open};
 pub use options::RendererOptions;
 pub use readback::{Readback, read};

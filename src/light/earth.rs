@@ -81,8 +81,7 @@ impl Earth {
             && middle(grid, place).is_some()
         {
             assumed.push(format!(
-                "{SENTENCE}comes from azimuths that are turned from true north to grid north, which lies {:.3} degrees \
-                 east of it at the DEM's middle.",
+                "{SENTENCE}alone is turned to true north: grid north lies {:.3} degrees east of it at the DEM's middle.",
                 earth.grid_north_deg
             ));
         }

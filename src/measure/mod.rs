@@ -50,7 +50,7 @@ pub const FILES: [&str; 4] = [
     "report.html",
 ];
 
-/// The commit that this was built from, where `CLIPSCAPE_COMMIT` was set when it was.
+/// The commit that this was built from: what `CLIPSCAPE_COMMIT` said, or in a release build git, see `build.rs`.
 pub const COMMIT: Option<&str> = option_env!("CLIPSCAPE_COMMIT");
 
 /// What to measure.

@@ -42,7 +42,7 @@ body { font: 15px/1.5 system-ui, sans-serif; color: #222; background: #fff; marg
   max-width: 76rem; }
 h1 { font-size: 1.7rem; margin: 0 0 .2rem; } h2 { font-size: 1.2rem; margin: 2.6rem 0 .4rem; }
 p { margin: .5rem 0; max-width: 50rem; } .quiet { color: #666; } code { font: .87em ui-monospace, monospace; }
-svg { width: 100%; max-width: 58rem; height: auto; display: block; margin: .6rem 0; }
+svg { width: 100%; min-width: 42rem; max-width: 58rem; height: auto; display: block; margin: .6rem 0; }
 svg text { font: 12.5px system-ui, sans-serif; fill: #444; } svg .axis { font-weight: 600; fill: #222; }
 svg .label { font-size: 11.5px; fill: #222; } svg .grid { stroke: #e4e4e4; stroke-width: 1; }
 .scroll { overflow-x: auto; } table { border-collapse: collapse; margin: .6rem 0; font-variant-numeric: tabular-nums; }
@@ -50,6 +50,7 @@ th, td { padding: .28rem .6rem; border-bottom: 1px solid #e4e4e4; text-align: ri
 th { font-weight: 600; border-bottom: 2px solid #bbb; vertical-align: bottom; } td.text, th.text { text-align: left; }
 .wide { font-size: 12.5px; } .wide th, .wide td { padding: .2rem .38rem; } .wide td { white-space: nowrap; }
 tr.front td { background: #eef6fb; } tr.cut td { color: #888; }
+.answer code, table code { white-space: nowrap; }
 .answer { border-left: 4px solid #0072b2; padding: .1rem 0 .1rem 1rem; margin: .8rem 0; }
 .fails { color: #b00020; font-weight: 600; }
 ";

@@ -22,6 +22,7 @@ mod s0;
 mod shelf;
 mod tile;
 mod truth;
+mod walk;
 
 use glam::DVec3;
 

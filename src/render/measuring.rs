@@ -116,26 +116,10 @@ impl SinglePass {
             traced_light: false,
             ..Default::default()
         };
-        let texture = |label, format| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d {
-                    width: size_px[0],
-                    height: size_px[1],
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            })
-        };
         Ok(Self {
             renderer: ClipmapRenderer::new(&gpu.device, &options)?,
-            colour: texture("clipscape measured colour", COLOUR_FORMAT),
-            depth: texture("clipscape measured depth", options.depth_format),
+            colour: gpu.target("clipscape measured colour", size_px, COLOUR_FORMAT),
+            depth: gpu.target("clipscape measured depth", size_px, options.depth_format),
         })
     }
 

@@ -147,6 +147,10 @@ impl HeightSource for Part {
         self.whole.read(rect.moved(self.at[0], self.at[1]), out)
     }
 
+    fn held_bytes(&self) -> u64 {
+        self.whole.held_bytes()
+    }
+
     /// Those of the whole, of which the part may have read little.
     fn reads(&self) -> Reads {
         self.whole.reads()

@@ -156,6 +156,11 @@ impl HeightSource for GeoTiff {
         &self.description
     }
 
+    fn held_bytes(&self) -> u64 {
+        let mask = self.mask.as_ref().map_or(0, Raster::held_bytes);
+        self.raster.held_bytes() + mask
+    }
+
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {
         let size = self.description.grid.size;
         if !size.rect().contains_rect(rect) || out.len() as i64 != rect.area() {

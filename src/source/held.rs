@@ -34,6 +34,10 @@ impl HeightSource for Held {
         &self.description
     }
 
+    fn held_bytes(&self) -> u64 {
+        size_of_val(&self.heights[..]) as u64
+    }
+
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {
         self.description.check_rect(rect, out)?;
         if rect.is_empty() {

@@ -22,7 +22,6 @@ mod options;
 mod paths;
 #[cfg(feature = "dem")]
 mod png;
-#[cfg(feature = "dem")]
 mod processors;
 mod projection;
 mod raw;

@@ -190,6 +190,10 @@ impl HeightSource for Mosaic {
         &self.description
     }
 
+    fn held_bytes(&self) -> u64 {
+        CACHE_BYTES.min(4 * self.description.grid.size.samples() as u64)
+    }
+
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {
         self.description.check_rect(rect, out)?;
         out.fill(f32::NAN);

@@ -1,4 +1,4 @@
-//! Shares the decoding of a file's blocks out to all processors.
+//! Shares the decoding of a file's blocks, or the computing of heights, out to all processors.
 
 use rayon::prelude::*;
 

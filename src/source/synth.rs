@@ -11,13 +11,18 @@ mod noise;
 
 use self::field::{Cells, Field, OCTAVES};
 use self::noise::Cell;
+use super::processors::Processors;
 use super::{Description, HeightSource};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, PATCH, Patch, Rect, Size};
 use crate::levels::{Arrival, Bounds, Levels, LightSample};
+use crate::work::each_chunk;
 
 /// The greatest size, in samples along a side.
 pub const MAX_SYNTH_SIZE: i64 = 1 << 20;
+
+/// Samples that one task computes at least, in whole rows.
+const TASK_SAMPLES: i64 = 1 << 14;
 
 /// Metres between samples.
 const SPACING_M: f64 = 30.0;
@@ -182,8 +187,23 @@ impl HeightSource for Synth {
         &self.description
     }
 
+    /// Rows are shared out to all processors where they are many.
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {
-        self.heights(0, rect, out).map(|_| ())
+        self.check(0, rect, self.size(0), out.len())?;
+        if !rect.is_empty() {
+            let task_rows = TASK_SAMPLES / rect.width() + 1;
+            each_chunk(
+                &Processors,
+                out,
+                (rect.width() * task_rows) as usize,
+                |n, rows| {
+                    let z0 = rect.z0 + n as i64 * task_rows;
+                    let z1 = (z0 + task_rows).min(rect.z1);
+                    self.fill(0, Rect::new(rect.x0, z0, rect.x1, z1), rows);
+                },
+            );
+        }
+        Ok(())
     }
 }
 

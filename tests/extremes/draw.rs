@@ -75,22 +75,7 @@ pub(crate) struct Floats {
 impl Floats {
     pub(crate) fn new(headless: &Headless, size_px: [u32; 2]) -> Self {
         let device = &headless.gpu().device;
-        let target = |format| {
-            device.create_texture(&wgpu::TextureDescriptor {
-                label: None,
-                size: wgpu::Extent3d {
-                    width: size_px[0],
-                    height: size_px[1],
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            })
-        };
+        let target = |format| headless.gpu().target("clipscape test floats", size_px, format);
         let options = RendererOptions {
             colour_format: wgpu::TextureFormat::Rgba16Float,
             traced_light: headless.clipmap().has_light(),

@@ -20,26 +20,10 @@ impl Depths {
             traced_light: false,
             ..Default::default()
         };
-        let texture = |format| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("clipscape test target"),
-                size: wgpu::Extent3d {
-                    width: size_px[0],
-                    height: size_px[1],
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            })
-        };
         Self {
             renderer: ClipmapRenderer::new(&gpu.device, &options).unwrap(),
-            colour: texture(options.colour_format),
-            depth: texture(options.depth_format),
+            colour: gpu.target("clipscape test colour", size_px, options.colour_format),
+            depth: gpu.target("clipscape test depth", size_px, options.depth_format),
             gpu,
         }
     }

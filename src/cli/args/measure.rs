@@ -42,7 +42,7 @@ pub(in crate::cli) struct MeasureArgs {
     #[arg(long, requires = "depth")]
     pub(in crate::cli) json: bool,
 
-    /// Fewer settings and frames, of 640x360 pixels: about two minutes instead of an hour on a software driver
+    /// Fewer settings and frames, of 640x360 pixels: two minutes instead of hours on a software driver
     #[arg(long)]
     pub(in crate::cli) quick: bool,
 

@@ -24,48 +24,11 @@ pub(in crate::cli) struct RenderArgs {
     #[arg(long, short, value_name = "PATH")]
     pub(in crate::cli) output: Option<PathBuf>,
 
-    /// Where the camera stands: world metres, x east, y up, z south of the north-western sample
-    #[arg(long, value_name = "X,Y,Z", value_parser = view_values::place, allow_hyphen_values = true)]
-    #[arg(conflicts_with = "flight", group = "camera")]
-    pub(in crate::cli) eye: Option<[f64; 3]>,
-
-    /// Where the camera stands in the DEM's own reference system: easting and northing, or longitude and latitude in
-    /// degrees, --above its ground
-    #[arg(long, value_name = "E,N", value_parser = view_values::crs_place, allow_hyphen_values = true)]
-    #[arg(conflicts_with = "flight", group = "camera")]
-    pub(in crate::cli) eye_at: Option<[f64; 2]>,
-
-    /// Metres of the camera above the ground [default: 2]
-    #[arg(long, value_name = "METRES", value_parser = values::number, allow_negative_numbers = true)]
-    #[arg(requires = "eye_at")]
-    pub(in crate::cli) above: Option<f64>,
-
-    /// What it looks at, instead of heading and pitch: the ground there, as for --eye-at
-    #[arg(long, value_name = "E,N", value_parser = view_values::crs_place, allow_hyphen_values = true)]
-    #[arg(requires = "camera", conflicts_with_all = ["heading", "pitch"])]
-    pub(in crate::cli) look_at: Option<[f64; 2]>,
-
-    /// Where it looks: degrees clockwise from north [default: 0]
-    #[arg(long, value_name = "DEGREES", value_parser = values::number, allow_negative_numbers = true)]
-    #[arg(requires = "camera")]
-    pub(in crate::cli) heading: Option<f64>,
-
-    /// Degrees upwards, -90 to 90 [default: 0]
-    #[arg(long, value_name = "DEGREES", value_parser = view_values::pitch, allow_negative_numbers = true)]
-    #[arg(requires = "camera")]
-    pub(in crate::cli) pitch: Option<f64>,
-
-    /// Degrees by which the right side is tilted down [default: 0]
-    #[arg(long, value_name = "DEGREES", value_parser = values::number, allow_negative_numbers = true)]
-    #[arg(requires = "camera")]
-    pub(in crate::cli) roll: Option<f64>,
-
-    /// Vertical field of view in degrees, 0.01 to below 180 [default: 60]
-    #[arg(long, value_name = "DEGREES", value_parser = view_values::fov, requires = "camera", allow_negative_numbers = true)]
-    pub(in crate::cli) fov: Option<f64>,
+    #[command(flatten)]
+    pub(in crate::cli) camera: CameraArgs,
 
     /// Draw the frames of a flight: a JSON file, or orbit to circle the DEM once
-    #[arg(long, value_name = "FILE|orbit")]
+    #[arg(long, value_name = "FILE|orbit", conflicts_with = "camera")]
     pub(in crate::cli) flight: Option<PathBuf>,
 
     /// Only these frames of the flight, the last one excluded
@@ -97,6 +60,50 @@ pub(in crate::cli) struct RenderArgs {
     /// Show no progress and no warnings
     #[arg(long, short)]
     pub(in crate::cli) quiet: bool,
+}
+
+/// Where the camera stands and looks.
+#[derive(Clone, Debug, Args)]
+pub(in crate::cli) struct CameraArgs {
+    /// Where the camera stands: world metres, x east, y up, z south of the north-western sample
+    #[arg(long, value_name = "X,Y,Z", value_parser = view_values::place, allow_hyphen_values = true)]
+    #[arg(group = "camera")]
+    pub(in crate::cli) eye: Option<[f64; 3]>,
+
+    /// Where the camera stands in the DEM's own reference system: easting and northing, or longitude and latitude in
+    /// degrees, --above its ground
+    #[arg(long, value_name = "E,N", value_parser = view_values::crs_place, allow_hyphen_values = true)]
+    #[arg(group = "camera")]
+    pub(in crate::cli) eye_at: Option<[f64; 2]>,
+
+    /// Metres of the camera above the ground [default: 2]
+    #[arg(long, value_name = "METRES", value_parser = values::number, allow_negative_numbers = true)]
+    #[arg(requires = "eye_at")]
+    pub(in crate::cli) above: Option<f64>,
+
+    /// What it looks at, instead of heading and pitch: the ground there, as for --eye-at
+    #[arg(long, value_name = "E,N", value_parser = view_values::crs_place, allow_hyphen_values = true)]
+    #[arg(requires = "camera", conflicts_with_all = ["heading", "pitch"])]
+    pub(in crate::cli) look_at: Option<[f64; 2]>,
+
+    /// Where it looks: degrees clockwise from north [default: 0]
+    #[arg(long, value_name = "DEGREES", value_parser = values::number, allow_negative_numbers = true)]
+    #[arg(requires = "camera")]
+    pub(in crate::cli) heading: Option<f64>,
+
+    /// Degrees upwards, -90 to 90 [default: 0]
+    #[arg(long, value_name = "DEGREES", value_parser = view_values::pitch, allow_negative_numbers = true)]
+    #[arg(requires = "camera")]
+    pub(in crate::cli) pitch: Option<f64>,
+
+    /// Degrees by which the right side is tilted down [default: 0]
+    #[arg(long, value_name = "DEGREES", value_parser = values::number, allow_negative_numbers = true)]
+    #[arg(requires = "camera")]
+    pub(in crate::cli) roll: Option<f64>,
+
+    /// Vertical field of view in degrees, 0.01 to below 180 [default: 60]
+    #[arg(long, value_name = "DEGREES", value_parser = view_values::fov, requires = "camera", allow_negative_numbers = true)]
+    pub(in crate::cli) fov: Option<f64>,
 }
 
 /// How terrain is shown, wherever it is.
@@ -193,9 +200,9 @@ mod tests {
         let parse = |line: &str| Render::try_parse_from(line.split_whitespace()).map(|r| r.args);
         let args =
             parse("render a.tif --eye -5,100,-3 --pitch -90 --heading -1e1 -z -2.5 --size 1x1").unwrap();
-        assert_eq!(args.eye, Some([-5.0, 100.0, -3.0]));
+        assert_eq!(args.camera.eye, Some([-5.0, 100.0, -3.0]));
         assert_eq!(
-            (args.pitch, args.heading, args.view.vertical_scale),
+            (args.camera.pitch, args.camera.heading, args.view.vertical_scale),
             (Some(-90.0), Some(-10.0), -2.5)
         );
         assert_eq!(
@@ -209,7 +216,7 @@ mod tests {
         );
         let args = parse("render a.tif --eye-at 1.5,-42 --above 300 --look-at 2,-43 --roll 3").unwrap();
         assert_eq!(
-            (args.eye_at, args.above, args.look_at),
+            (args.camera.eye_at, args.camera.above, args.camera.look_at),
             (Some([1.5, -42.0]), Some(300.0), Some([2.0, -43.0]))
         );
         let args = parse("render a.exr --flight orbit --frames 0..3 --view level").unwrap();

@@ -28,6 +28,7 @@ pub(super) struct Raster {
     samples: Samples,
     work: Box<dyn Work + Send>,
     cache: Mutex<Cache>,
+    cache_bytes: u64,
     decoded: AtomicU64,
     infinite: AtomicU64,
 }
@@ -45,6 +46,7 @@ impl Raster {
             samples,
             work,
             cache: Mutex::new(Cache::new(budget as usize)),
+            cache_bytes: budget as u64,
             decoded: AtomicU64::new(0),
             infinite: AtomicU64::new(0),
         }
@@ -52,6 +54,16 @@ impl Raster {
 
     pub(super) fn layout(&self) -> &Layout {
         &self.layout
+    }
+
+    /// The most that is held of decoded blocks, in bytes: the cache, and blocks on their way into it.
+    pub(super) fn held_bytes(&self) -> u64 {
+        let Layout {
+            width, height, kind, ..
+        } = &self.layout;
+        let whole = (width * height) as u64 * kind.bytes() as u64;
+        let row_of_blocks = whole / self.layout.down().max(1) as u64;
+        whole.min(self.cache_bytes + row_of_blocks.max(BATCH_BYTES as u64))
     }
 
     /// What reading has met so far.

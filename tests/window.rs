@@ -1,0 +1,429 @@
+//! The window as a user meets it: opened on a screen without a monitor, driven by keys and mouse, and closed.
+//!
+//! Needs Linux with Xvfb and xdotool (Debian's packages of these names), and says so where they are missing; with
+//! `CLIPSCAPE_REQUIRE_WINDOW=1` that is a failure.
+//!
+//! Ten minutes of random input, of which the smoke test does a few seconds:
+//!
+//!     CLIPSCAPE_WINDOW_MINUTES=10 CLIPSCAPE_SEED=1 cargo test --release --test window random -- --nocapture
+#![cfg(all(feature = "window", feature = "cli", target_os = "linux"))]
+#![allow(
+    clippy::print_stderr,
+    reason = "a test says why it is skipped, and what it drew by chance"
+)]
+
+mod support;
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use clipscape::Flight;
+use support::{Random, gpu, seed};
+
+/// How long anything may take here, on a machine that does other things too.
+const PATIENCE: Duration = Duration::from_secs(90);
+
+/// The golden frames' tolerance: mean difference of 255, and the share of pixels that may differ by more than `FAR`.
+const MEAN_LIMIT: f64 = 0.25;
+const FAR_SHARE_LIMIT: f64 = 0.005;
+const FAR: u8 = 4;
+
+/// A screen without a monitor; gone when dropped.
+struct Screen {
+    server: Child,
+    display: String,
+}
+
+impl Screen {
+    /// Starts one on a number that is free, or says why not.
+    fn start() -> Option<Self> {
+        let missing = |what: &str| {
+            let required = std::env::var_os("CLIPSCAPE_REQUIRE_WINDOW").is_some_and(|v| v == "1");
+            assert!(!required, "CLIPSCAPE_REQUIRE_WINDOW is set, but {what}");
+            eprintln!("skipped: {what}");
+            None
+        };
+        gpu()?;
+        if Command::new("xdotool").arg("version").output().is_err() {
+            return missing("there is no xdotool");
+        }
+        let server = Command::new("Xvfb")
+            .args([
+                "-displayfd",
+                "1",
+                "-screen",
+                "0",
+                "1024x768x24",
+                "-nolisten",
+                "tcp",
+            ])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let Ok(mut server) = server else {
+            return missing("there is no Xvfb");
+        };
+        let mut number = String::new();
+        let mut out = BufReader::new(server.stdout.take().expect("it is piped"));
+        out.read_line(&mut number).expect("Xvfb says its number");
+        let display = format!(":{}", number.trim());
+        Some(Self { server, display })
+    }
+
+    /// Sends input.
+    fn send(&self, words: &[&str]) -> String {
+        let output = Command::new("xdotool")
+            .args(words)
+            .env("DISPLAY", &self.display)
+            .output()
+            .expect("xdotool starts");
+        String::from_utf8(output.stdout).expect("text")
+    }
+
+    fn key(&self, key: &str) {
+        self.send(&["key", key]);
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// The program with its window; ended when dropped.
+struct Window<'a> {
+    screen: &'a Screen,
+    program: Child,
+    lines: Receiver<String>,
+}
+
+impl<'a> Window<'a> {
+    /// Flies as a user would, and waits until there is a window that hears keys.
+    fn open(screen: &'a Screen, arguments: &[&str]) -> Self {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_clipscape"))
+            .arg("fly")
+            .args(arguments)
+            .env("DISPLAY", &screen.display)
+            .env_remove("WAYLAND_DISPLAY")
+            .env_remove("WAYLAND_SOCKET")
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let err = BufReader::new(program.stderr.take().expect("it is piped"));
+        let (say, lines) = channel();
+        std::thread::spawn(move || {
+            err.lines()
+                .map_while(Result::ok)
+                .try_for_each(|line| say.send(line))
+        });
+        let window = Self {
+            screen,
+            program,
+            lines,
+        };
+        let start = Instant::now();
+        let id = loop {
+            let found = screen.send(&["search", "--onlyvisible", "--name", "^clipscape: "]);
+            if let Some(id) = found.lines().next() {
+                break id.to_string();
+            }
+            assert!(start.elapsed() < PATIENCE, "no window appears");
+            sleep(Duration::from_millis(100));
+        };
+        // Without a window manager nobody gives it the keyboard.
+        screen.send(&["windowfocus", "--sync", &id]);
+        window
+    }
+
+    /// Presses a key until a line says what it is to say: before the terrain is there, keys do nothing.
+    fn press_until(&self, key: &str, says: impl Fn(&str) -> bool) -> String {
+        let start = Instant::now();
+        while start.elapsed() < PATIENCE {
+            self.screen.key(key);
+            let until = Instant::now() + Duration::from_secs(3);
+            while let Ok(line) = self.lines.recv_timeout(until - Instant::now().min(until)) {
+                if says(&line) {
+                    return line;
+                }
+            }
+        }
+        panic!("{key} is without effect");
+    }
+
+    /// A picture of all that is to be seen, once it is.
+    fn picture(&self) -> PathBuf {
+        let line = self.press_until("p", |line| line.ends_with(".png is written"));
+        let path = line.strip_prefix("clipscape: ").expect("it is the program's");
+        PathBuf::from(path.strip_suffix(" is written").expect("it ends so"))
+    }
+
+    /// Its memory in bytes, as the system counts what is resident.
+    fn resident_bytes(&self) -> u64 {
+        let status = fs::read_to_string(format!("/proc/{}/status", self.program.id())).expect("it runs");
+        let line = status
+            .lines()
+            .find(|l| l.starts_with("VmRSS:"))
+            .expect("it has memory");
+        let kib = line.split_whitespace().nth(1).and_then(|n| n.parse::<u64>().ok());
+        1024 * kib.expect("a number")
+    }
+
+    /// Quits, and returns the exit status and what else was said.
+    fn quit(mut self) -> (Option<i32>, Vec<String>) {
+        self.screen.key("Escape");
+        let start = Instant::now();
+        let status = loop {
+            if let Some(status) = self.program.try_wait().expect("it is a child") {
+                break status;
+            }
+            assert!(start.elapsed() < PATIENCE, "it does not quit");
+            sleep(Duration::from_millis(50));
+        };
+        (status.code(), self.lines.try_iter().collect())
+    }
+}
+
+impl Drop for Window<'_> {
+    fn drop(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
+
+fn pixels(path: &Path) -> (u32, u32, Vec<u8>) {
+    let file = BufReader::new(File::open(path).expect("the picture is there"));
+    let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
+    let mut rgb = vec![0; reader.output_buffer_size().expect("it fits")];
+    let info = reader.next_frame(&mut rgb).expect("a picture");
+    rgb.truncate(info.buffer_size());
+    (info.width, info.height, rgb)
+}
+
+/// The mean difference, and the share of pixels that are far off.
+fn difference(a: &Path, b: &Path) -> (f64, f64) {
+    let ((w, h, a), (v, g, b)) = (pixels(a), pixels(b));
+    assert_eq!((w, h), (v, g));
+    let off: Vec<u8> = a.iter().zip(&b).map(|(a, b)| a.abs_diff(*b)).collect();
+    let mean = off.iter().map(|&d| f64::from(d)).sum::<f64>() / off.len() as f64;
+    let far = off.chunks(3).filter(|p| p.iter().any(|&d| d > FAR)).count();
+    (mean, far as f64 / f64::from(w * h))
+}
+
+#[test]
+fn a_recorded_flight_is_replayed_to_the_picture_that_was_seen() {
+    let Some(screen) = Screen::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let window = Window::open(
+        &screen,
+        &[
+            "synth:1024:3",
+            "--size",
+            "800x500",
+            "--clip-size",
+            "128",
+            "--output-dir",
+            out,
+        ],
+    );
+    let first = window.picture();
+    assert_eq!(first, folder.path().join("synth-1024-3-001.png"));
+
+    screen.key("r");
+    for key in ["w", "d", "Up"] {
+        screen.send(&["keydown", key]);
+        sleep(Duration::from_millis(400));
+        screen.send(&["keyup", key]);
+    }
+    screen.send(&["mousemove", "600", "250", "mousedown", "1"]);
+    for _ in 0..5 {
+        screen.send(&["mousemove_relative", "--sync", "--", "12", "-3"]);
+    }
+    screen.send(&["mouseup", "1", "click", "4", "click", "5"]);
+    // It comes to rest.
+    sleep(Duration::from_millis(1500));
+    let seen = window.picture();
+    let line = window.press_until("r", |line| line.contains("to replay it: "));
+    let (status, rest) = window.quit();
+    assert_eq!(status, Some(0), "{rest:?}");
+    assert!(rest.is_empty(), "{rest:?}");
+
+    let json = fs::read_to_string(folder.path().join("synth-1024-3-001.json")).unwrap();
+    let flight = Flight::parse("the flight", &json).unwrap();
+    let last = flight.frame_count() - 1;
+    let (from, to) = (flight.camera_at_frame(0), flight.camera_at_frame(last));
+    assert!(from.eye.distance(to.eye) > 10.0, "keys move: {from:?} {to:?}");
+    assert!(
+        (from.heading_deg - to.heading_deg).abs() > 1.0,
+        "the mouse turns: {from:?} {to:?}"
+    );
+
+    let (_, command) = line.split_once("to replay it: clipscape ").expect("a command");
+    let frames = folder.path().join("frames");
+    let render = Command::new(env!("CARGO_BIN_EXE_clipscape"))
+        .args(command.split_whitespace())
+        .args(["--frames", &format!("{last}..{}", last + 1), "-o"])
+        .arg(&frames)
+        .output()
+        .unwrap();
+    assert!(
+        render.status.success(),
+        "{}",
+        String::from_utf8_lossy(&render.stderr)
+    );
+    let replayed = frames.join(format!("{last:05}.png"));
+    let (mean, far) = difference(&replayed, &seen);
+    eprintln!(
+        "replayed and seen differ by {mean:.4} of 255 in the mean, {:.3} % by more than {FAR}",
+        100.0 * far
+    );
+    assert!(mean <= MEAN_LIMIT && far <= FAR_SHARE_LIMIT, "{mean} {far}");
+    let (mean, far) = difference(&replayed, &first);
+    assert!(
+        mean > MEAN_LIMIT && far > FAR_SHARE_LIMIT,
+        "control, another pose: {mean} {far}"
+    );
+}
+
+/// Random keys, drags, wheel and clicks. What quits or fills the disk is left out; the clip size is, for it is meant to
+/// change how much memory is taken.
+fn play(screen: &Screen, random: &mut Random) {
+    const KEYS: [&str; 33] = [
+        "w", "a", "s", "d", "q", "e", "i", "j", "k", "l", "Up", "Down", "Left", "Right", "Home", "1", "2",
+        "3", "4", "t", "y", "x", "b", "v", "u", "o", "h", "Tab", "m", "g", "plus", "minus", "f",
+    ];
+    match random.bits() % 8 {
+        0..=4 => {
+            let key = random.pick(&KEYS);
+            let shift = random.bits().is_multiple_of(3);
+            if shift {
+                screen.send(&["keydown", "shift"]);
+            }
+            screen.send(&["keydown", key]);
+            sleep(Duration::from_millis(random.bits() % 400));
+            screen.send(&["keyup", key, "keyup", "shift"]);
+        }
+        5 | 6 => {
+            let at = [random.bits() % 800, random.bits() % 500].map(|v| v.to_string());
+            let by = [random.bits() % 300, random.bits() % 200].map(|v| (v as i64 - 120).to_string());
+            screen.send(&["mousemove", &at[0], &at[1], "mousedown", "1"]);
+            screen.send(&["mousemove_relative", "--", &by[0], &by[1]]);
+            screen.send(&["mouseup", "1"]);
+        }
+        _ => {
+            let button = if random.bits().is_multiple_of(2) { "4" } else { "5" };
+            screen.send(&["click", "--repeat", "3", button]);
+        }
+    }
+}
+
+#[test]
+fn random_input_neither_ends_it_nor_fills_the_memory() {
+    let Some(screen) = Screen::start() else { return };
+    let minutes = std::env::var("CLIPSCAPE_WINDOW_MINUTES").ok();
+    let minutes = minutes.and_then(|m| m.parse::<f64>().ok());
+    let length = Duration::from_secs_f64(60.0 * minutes.unwrap_or(0.1));
+    let seed = seed(16);
+    eprintln!("seed {seed}, {:.0} s", length.as_secs_f64());
+    let mut random = Random(seed);
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let mut window = Window::open(
+        &screen,
+        &[
+            "synth:4096:3",
+            "--size",
+            "800x500",
+            "--clip-size",
+            "64",
+            "--output-dir",
+            out,
+        ],
+    );
+    window.picture();
+    let start = Instant::now();
+    let mut resident = Vec::new();
+    while start.elapsed() < length {
+        play(&screen, &mut random);
+        let ended = window.program.try_wait().expect("it is a child");
+        assert!(
+            ended.is_none(),
+            "it has ended: {ended:?}, {:?}",
+            window.lines.try_iter().collect::<Vec<_>>()
+        );
+        resident.push(window.resident_bytes());
+    }
+    let most = |part: &[u64]| part.iter().max().copied().unwrap_or_default() >> 20;
+    let thirds: Vec<u64> = resident.chunks(resident.len().div_ceil(3)).map(most).collect();
+    eprintln!(
+        "{} inputs; most memory in each third: {thirds:?} MiB",
+        resident.len()
+    );
+    if minutes.is_some_and(|m| m >= 3.0) {
+        // The first third makes all pipelines, and meets the terrain that the budget of tiles holds.
+        assert!(
+            thirds[2] <= thirds[1] + thirds[1] / 20 + 16,
+            "it grows: {thirds:?} MiB"
+        );
+    }
+    // It may be in full screen, in the help, or hold the mouse: Esc leaves these first.
+    for _ in 0..4 {
+        if window.program.try_wait().expect("it is a child").is_none() {
+            screen.key("Escape");
+            sleep(Duration::from_millis(1000));
+        }
+    }
+    let (status, rest) = window.quit();
+    assert_eq!(status, Some(0), "{rest:?}");
+}
+
+#[test]
+fn without_a_display_one_line_says_what_to_do_instead() {
+    let run = |arguments: &[&str]| {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_clipscape"))
+            .arg("fly")
+            .args(arguments)
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY")
+            .env_remove("WAYLAND_SOCKET")
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let mut said = String::new();
+        program.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+        (program.wait().unwrap().code(), said)
+    };
+    let (status, said) = run(&["synth:64"]);
+    assert_eq!(status, Some(1), "{said}");
+    assert!(
+        said.starts_with("clipscape: display: ") && said.lines().count() == 1,
+        "{said}"
+    );
+    assert!(said.contains("clipscape render"), "{said}");
+    // What is wrong with what was typed is said first.
+    for (arguments, status, says) in [
+        (&["missing.tif"][..], 1, "missing.tif"),
+        (&["synth:64", "--output-dir", "missing"], 1, "missing"),
+        (&["synth:64", "--clip-size", "auto"], 2, "--clip-size"),
+        (&["synth:64", "--stats", "a"], 2, "--stats"),
+        (
+            &["synth:64", "--wait", "all", "--upload-budget", "1M"],
+            2,
+            "upload budget",
+        ),
+    ] {
+        let (code, said) = run(arguments);
+        assert_eq!(code, Some(status), "{arguments:?}: {said}");
+        assert!(
+            said.contains(says) && said.lines().count() == 1,
+            "{arguments:?}: {said}"
+        );
+    }
+}
