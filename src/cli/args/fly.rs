@@ -62,7 +62,7 @@ mod tests {
     #[test]
     fn all_may_be_left_out_and_frames_do_not_wait() {
         let args = parse("fly").unwrap();
-        assert!(args.inputs.is_empty() && args.output_dir == ".");
+        assert!(args.inputs.is_empty() && args.output_dir == *".");
         assert_eq!(args.view.wait, Wait::None);
         let args = parse("fly a.tif b.tif --wait all --spacing 30 --eye 1,2,3 --heading -5 -z 2").unwrap();
         assert_eq!((args.inputs.len(), args.view.wait), (2, Wait::All));
