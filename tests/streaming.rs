@@ -8,7 +8,7 @@ use std::sync::Arc;
 use clipscape::clipmap::{Clipmap, ClipmapOptions, UpdateReport, Wait, displace};
 use clipscape::levels::Levels;
 use clipscape::progress::Silent;
-use clipscape::source::Synth;
+use clipscape::source::{ReadAt, Synth};
 use clipscape::stream::{LEAST_TILE_BYTES, Terrain, TileOptions};
 use support::flights::{Rough, Wander, bytes_of, garbage, make_file, settle, view};
 use support::{facts, seed};
@@ -219,10 +219,26 @@ fn views_share_what_was_loaded() {
     let second = terrain.arriving();
     let mut other = Clipmap::new(&second, &options(Wait::None)).unwrap();
     assert!(other.update(&second, &spot, 0.0).unwrap().complete);
-    let fresh = Terrain::from_bytes("a", bytes_of(&path), &Silent).unwrap();
+    // Of a file that is slow to read, and of which nothing has been loaded, it is not.
+    let slow = Arc::new(Slow(bytes_of(&path)));
+    let fresh = Terrain::from_bytes("a", slow, &Silent).unwrap();
     let third = fresh.arriving();
     let mut other = Clipmap::new(&third, &options(Wait::None)).unwrap();
     assert!(!other.update(&third, &spot, 0.0).unwrap().complete, "control");
+}
+
+/// Bytes of which each piece takes a while.
+struct Slow(Arc<Vec<u8>>);
+
+impl ReadAt for Slow {
+    fn size_bytes(&self) -> u64 {
+        self.0.size_bytes()
+    }
+
+    fn read_exact_at(&self, offset: u64, out: &mut [u8]) -> std::io::Result<()> {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        self.0.read_exact_at(offset, out)
+    }
 }
 
 #[test]

@@ -25,7 +25,8 @@ fn texts(size: [f32; 2], shown: &Shown, changed: &mut Changed) -> Vec<(String, e
 
 fn collect(shape: &egui::Shape, texts: &mut Vec<(String, egui::Rect)>) {
     match shape {
-        egui::Shape::Text(text) => {
+        // A text without a letter stands nowhere.
+        egui::Shape::Text(text) if !text.galley.text().is_empty() => {
             texts.push((text.galley.text().to_string(), text.visual_bounding_rect()));
         }
         egui::Shape::Vec(shapes) => shapes.iter().for_each(|s| collect(s, texts)),

@@ -78,8 +78,8 @@ fn after_any_change_of_settings_the_picture_is_that_of_a_frame_made_for_them() {
         |s| s.clipmap.vertical_scale = 2.5,
         |s| s.clipmap.transition = Some(1),
         |s| s.set_clip_size(256),
-        |s| s.clipmap.max_error_px = Some(2.0),
-        |s| s.clipmap.max_error_px = Some(8.0),
+        |s| s.clipmap.max_error_px = Some(30.0),
+        |s| s.clipmap.max_error_px = Some(60.0),
     ];
     let (mut settings, mut before) = (settings(), first);
     for (k, change) in changes.into_iter().enumerate() {
