@@ -4,8 +4,8 @@
 //! spans whose drawn end is seen on the triangle and whose length is at most e, the most by which the drawn surface may
 //! stray there from the DEM's own (`stray.rs`). It speaks of places where both exist, not of silhouettes or shading.
 //!
-//! *In few steps.* What a patch's box and stored errors allow is no less than what its triangles do, and costs a
-//! hundredth of it. So all patches are bounded by their boxes, and those that allow most are looked at triangle by triangle,
+//! *In few steps.* What a patch's box and stored errors allow is no less than what its triangles do, and costs far
+//! less. So all patches are bounded by their boxes, and those that allow most are looked at triangle by triangle,
 //! until what remains allows no more than what was found.
 //!
 //! *A box holds its triangles*, e on them is at most that of the patch, and [`super::Screen`]'s bounds rise with both.
