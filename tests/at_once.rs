@@ -93,6 +93,27 @@ fn fly_until_final(terrain: &Terrain, light: bool) -> (Clipmap, u32) {
 }
 
 #[test]
+fn a_dem_whose_light_does_not_fit_is_drawn_without() {
+    let options = AtOnce {
+        memory_bytes: 90 << 20,
+        ..at_once(None)
+    };
+    let terrain = Terrain::open_at_once(&[DEM], &OpenOptions::default(), &options, &Silent).unwrap();
+    let (clipmap, _) = fly_until_final(&terrain, false);
+    let start = Instant::now();
+    while terrain.is_building() {
+        assert!(start.elapsed() < Duration::from_secs(120), "it has no end");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let said = terrain.take_warnings();
+    assert!(!terrain.is_provisional() && !terrain.has_light() && !clipmap.has_light());
+    assert!(
+        said.len() == 1 && said[0].ends_with("; it is drawn without traced light"),
+        "{said:?}"
+    );
+}
+
+#[test]
 fn a_draft_becomes_the_terrain_that_the_next_run_opens() {
     let folder = tempfile::tempdir().unwrap();
     let cache = folder.path().join("made/as needed");

@@ -68,6 +68,7 @@ pub(super) fn run(args: &FlyArgs, terminal: &Terminal) -> Outcome {
                 ..Default::default()
             },
             tiles,
+            ..Default::default()
         }),
     };
     let open: window::Open = Box::new(move |progress| {

@@ -208,6 +208,7 @@ fn open(
             ..Default::default()
         },
         tiles: *tiles,
+        ..Default::default()
     };
     Terrain::open_at_once(inputs, &options, &at_once, terminal)
 }

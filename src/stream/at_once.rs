@@ -8,7 +8,7 @@ use super::cache_folder::{CacheFolder, Fingerprint};
 use super::draft::Draft;
 use super::stage::Stage;
 use super::{Origin, READER_BYTES, Terrain, TileOptions};
-use crate::build::Threads;
+use crate::build::{HELD_MEMORY_BYTES, Threads};
 use crate::error::{ErrorKind, Result};
 use crate::light::LightOptions;
 use crate::progress::Progress;
@@ -16,7 +16,7 @@ use crate::source::{self, HeightSource, OpenOptions, Synth};
 use crate::terrain::{TerrainFile, is_terrain};
 
 /// How a DEM is opened at once.
-#[derive(Clone, Debug, PartialEq, Default)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct AtOnce {
     /// Where its terrain file is kept for the next run; none keeps none.
     pub folder: Option<CacheFolder>,
@@ -24,6 +24,19 @@ pub struct AtOnce {
     pub light: LightOptions,
     /// How tiles are kept and loaded.
     pub tiles: TileOptions,
+    /// The memory that building it may take: a DEM whose light takes more is drawn without.
+    pub memory_bytes: u64,
+}
+
+impl Default for AtOnce {
+    fn default() -> Self {
+        Self {
+            folder: None,
+            light: LightOptions::default(),
+            tiles: TileOptions::default(),
+            memory_bytes: HELD_MEMORY_BYTES,
+        }
+    }
 }
 
 impl Terrain {
@@ -74,6 +87,7 @@ impl Terrain {
             has_heights,
             light: at_once.light,
             tiles: at_once.tiles,
+            memory_bytes: at_once.memory_bytes,
         };
         terrain.background = Some(Background::start(plan, terrain.current.clone()));
         Ok(terrain)

@@ -31,6 +31,7 @@ pub(super) struct Plan {
     pub(super) has_heights: bool,
     pub(super) light: LightOptions,
     pub(super) tiles: TileOptions,
+    pub(super) memory_bytes: u64,
 }
 
 /// A build on a thread of its own.
@@ -65,7 +66,12 @@ impl Background {
             if let Err(error) = build(&plan, &current, &theirs)
                 && error.kind() != ErrorKind::Cancelled
             {
-                theirs.warn(&format!("{error}; what was drawn stays provisional"));
+                let stays = if theirs.lock().heights_done {
+                    "it is drawn without traced light"
+                } else {
+                    "what was drawn stays provisional"
+                };
+                theirs.warn(&format!("{error}; {stays}"));
             }
             theirs.heights_done();
         };
@@ -221,6 +227,7 @@ fn make(
         light,
         force: true,
         source: plan.fingerprint.stamp(),
+        memory_bytes: plan.memory_bytes,
         ..Default::default()
     };
     preprocess(plan.source.as_ref(), &path, &options, shared)?;
