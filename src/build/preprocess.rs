@@ -63,7 +63,7 @@ pub struct PreprocessReport {
     pub pyramid_s: f64,
     /// Seconds to read heights back and measure the bounds.
     pub bounds_s: f64,
-    /// Seconds to trace the sun's share.
+    /// Seconds to read heights back and trace the sun's share.
     pub sun_s: f64,
     /// Seconds to trace the sky's share, and to filter both into levels.
     pub sky_s: f64,

@@ -4,25 +4,18 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::time::Instant;
 
-use super::memory::peak_rss_bytes;
+use super::light::trace;
+use super::memory::{self, needed_bytes, peak_rss_bytes};
 use super::output::Output;
 use super::preprocess::{PreprocessOptions, PreprocessReport};
 use super::threads::Threads;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
 use crate::levels::{Arrival, Bounds, Levels, LightSample};
-use crate::light::{Earth, LightOptions, light_levels, sky_share_on, sun_share_on};
+use crate::light::Earth;
 use crate::progress::Progress;
 use crate::pyramid::{Filter, FilterKind};
 use crate::terrain::{self, LightMeta, Meta, TerrainFile};
-
-/// Bytes a sample of level 0 takes at the peak: its height, two shares, their levels before and after rounding; and
-/// what does not depend on the DEM.
-const BYTES_A_SAMPLE: u64 = 24;
-const FIXED_BYTES: u64 = 64 << 20;
-
-/// Rows of heights that are read at once.
-const BAND_ROWS: i64 = 256;
 
 /// Makes the terrain file `out` of `file`, with the light that `options` say, or none, in place of its own. Heights and
 /// bounds are those of `file`, to the bit, and so are the bytes of their tiles where this version made them. `out` may
@@ -44,7 +37,14 @@ pub fn relight(
     let filter = filter_of(file)?;
     if let Some(light) = &options.light {
         light.sun.check()?;
-        check_memory(file, options.memory_bytes)?;
+        let needed = |grid: &Grid| needed_bytes(grid, true);
+        memory::check(
+            file.name(),
+            grid,
+            needed,
+            options.memory_bytes,
+            "or leave out the light",
+        )?;
     }
     let earth = Earth::of(grid, place.as_ref(), options.curvature).map_err(|e| e.about(file.name()))?;
     let threads = Threads::new(options.threads)?;
@@ -57,7 +57,11 @@ pub fn relight(
     };
     let steps = |report: &mut PreprocessReport| -> Result<()> {
         let light = match &options.light {
-            Some(light) => trace(file, light, &earth, &filter, &threads, progress, report)?,
+            Some(light) => {
+                let (light, took) = trace(file, light, &earth, &filter, &threads, progress)?;
+                (report.sun_s, report.sky_s) = (took.sun_s, took.sky_s);
+                light
+            }
             None => Vec::new(),
         };
         let written = Instant::now();
@@ -99,62 +103,6 @@ fn filter_of(file: &TerrainFile) -> Result<Filter> {
         );
         Error::new(ErrorKind::Unsupported, file.name(), what).advice("preprocess the DEM that it was made of")
     })
-}
-
-/// Refuses a file whose light takes more than `ceiling_bytes`.
-fn check_memory(file: &TerrainFile, ceiling_bytes: u64) -> Result<()> {
-    let samples = file.grid().size.samples() as u64;
-    let needed = samples.saturating_mul(BYTES_A_SAMPLE).saturating_add(FIXED_BYTES);
-    if needed <= ceiling_bytes {
-        return Ok(());
-    }
-    let needed = needed.div_ceil(1 << 20);
-    let what = format!(
-        "its light needs {needed} MiB of memory, {} MiB are allowed",
-        ceiling_bytes >> 20
-    );
-    Err(Error::new(ErrorKind::Limit, file.name(), what).advice(format!("allow {needed} MiB")))
-}
-
-/// The light of all levels, and the seconds that its parts took.
-fn trace(
-    file: &TerrainFile,
-    light: &LightOptions,
-    earth: &Earth,
-    filter: &Filter,
-    threads: &Threads,
-    progress: &dyn Progress,
-    report: &mut PreprocessReport,
-) -> Result<Vec<Vec<LightSample>>> {
-    let grid = file.grid();
-    let (width, height) = (grid.size.width, grid.size.height);
-    let mut lap = Instant::now();
-    let mut seconds = || {
-        let now = Instant::now();
-        (now - std::mem::replace(&mut lap, now)).as_secs_f64()
-    };
-    let mut heights = vec![f32::NAN; grid.size.samples() as usize];
-    progress.begin("read", heights.len() as u64);
-    let bands = heights.chunks_mut((BAND_ROWS * width) as usize);
-    for (band, z) in bands.zip((0..height).step_by(BAND_ROWS as usize)) {
-        if progress.cancelled() {
-            return Err(Error::cancelled(file.name()));
-        }
-        let rect = Rect::new(0, z, width, (z + BAND_ROWS).min(height));
-        match file.heights(0, rect, band)? {
-            Arrival::Arrived => progress.advance(band.len() as u64),
-            Arrival::Missing => {
-                return Err(Error::new(ErrorKind::Io, file.name(), "its heights did not come"));
-            }
-        }
-    }
-    report.read_s = seconds();
-    let sun = sun_share_on(&heights, grid, earth, light.sun, threads, progress)?;
-    report.sun_s = seconds();
-    let sky = sky_share_on(&heights, grid, earth, light.sky_directions, threads, progress)?;
-    let levels = light_levels(grid, &heights, sun, sky, filter, threads, progress)?;
-    report.sky_s = seconds();
-    Ok(levels)
 }
 
 /// What the new file says of itself.

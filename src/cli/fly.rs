@@ -108,18 +108,7 @@ fn clipmap_options(args: &FlyArgs) -> Result<ClipmapOptions> {
             .advice("give a number; the panel turns it while flying"));
         }
     };
-    let options = ClipmapOptions {
-        clip_size,
-        levels: view.levels,
-        transition: view.transition,
-        vertical_scale: view.vertical_scale,
-        cull: !view.no_cull,
-        max_error_px: view.max_error_px,
-        wait: view.wait,
-        upload_budget_bytes: view.upload_budget,
-    };
-    options.check()?;
-    Ok(options)
+    view.clipmap_options(clip_size)
 }
 
 /// What the window is called after: the first input, and how many more there are.

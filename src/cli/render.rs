@@ -356,18 +356,7 @@ fn clipmap_options(args: &RenderArgs) -> Result<ClipmapOptions> {
         let what = "auto keeps a promised error, and none is promised";
         return Err(Error::new(ErrorKind::Misuse, "--clip-size", what).advice("give --max-error-px too"));
     }
-    let options = ClipmapOptions {
-        clip_size: clip_size(args),
-        levels: view.levels,
-        transition: view.transition,
-        vertical_scale: view.vertical_scale,
-        cull: !view.no_cull,
-        max_error_px: view.max_error_px,
-        wait: view.wait,
-        upload_budget_bytes: view.upload_budget,
-    };
-    options.check()?;
-    Ok(options)
+    view.clipmap_options(clip_size(args))
 }
 
 pub(super) fn tile_options(view: &ViewArgs) -> Result<TileOptions> {

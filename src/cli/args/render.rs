@@ -8,7 +8,8 @@ use clap::Args;
 use super::InputArgs;
 use crate::cli::values;
 use crate::cli::view_values::{self, ClipSize};
-use crate::clipmap::Wait;
+use crate::clipmap::{ClipmapOptions, Wait};
+use crate::error::Result;
 use crate::light::Sun;
 use crate::shade::ViewMode;
 
@@ -182,6 +183,27 @@ pub(in crate::cli) struct ViewArgs {
     /// Write a line of JSON for each frame and a summary
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) stats: Option<PathBuf>,
+}
+
+impl ViewArgs {
+    /// The clipmap that is asked for, with a clip size that was decided on.
+    ///
+    /// # Errors
+    /// Where what is asked for does not go together.
+    pub(in crate::cli) fn clipmap_options(&self, clip_size: i64) -> Result<ClipmapOptions> {
+        let options = ClipmapOptions {
+            clip_size,
+            levels: self.levels,
+            transition: self.transition,
+            vertical_scale: self.vertical_scale,
+            cull: !self.no_cull,
+            max_error_px: self.max_error_px,
+            wait: self.wait,
+            upload_budget_bytes: self.upload_budget,
+        };
+        options.check()?;
+        Ok(options)
+    }
 }
 
 #[cfg(test)]
