@@ -1,6 +1,6 @@
 //! What near ground hides of far ground: an occlusion horizon, raised patch by patch from the eye outwards.
 //!
-//! After Lloyd and Egbert (2002), "Horizon occlusion culling for real-time rendering of hierarchical terrains". The horizon
+//! After Lloyd and Egbert, "Horizon Occlusion Culling for Real-time Rendering of Hierarchical Terrains" (2002). The horizon
 //! is the greatest tangent of elevation, for each of a circle's bins of directions over the ground, below which
 //! everything farther out is hidden. It is conservative, so that the picture is the same with and without it:
 //!
