@@ -79,6 +79,13 @@ pub(super) fn cache_bytes(left_bytes: u64) -> usize {
     usize::try_from(LEAST_CACHE_BYTES + left_bytes / 8 * 7).unwrap_or(usize::MAX)
 }
 
+/// The bytes of the heights of all levels of a DEM of `grid` as tiles that are kept, and a little more.
+pub(super) fn decoded_bytes(grid: &Grid) -> u64 {
+    (grid.size.samples() as u64)
+        .saturating_mul(6)
+        .saturating_add(1 << 20)
+}
+
 /// Refuses a DEM called `name` whose grid is impossible, or of which something needs more than `ceiling_bytes`.
 pub(super) fn check(
     name: &str,

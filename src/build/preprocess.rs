@@ -161,14 +161,20 @@ pub fn preprocess(
 
         let name = out.display().to_string();
         let heights = writer.readable(&name, &meta, || source::open_file(output.temporary()))?;
-        // The second pass reads a tile once.
-        let heights = heights.with_cache(0);
+        // Each pass reads a tile once, so that nothing is kept unless all of it can be, for light to be traced over.
+        let left = options.memory_bytes - needed(&description.grid);
+        let cache_bytes = options.light.map_or(0, |_| memory::cache_bytes(left));
+        let all = memory::decoded_bytes(&description.grid) <= cache_bytes as u64;
+        let heights = heights.with_cache(if all { cache_bytes } else { 0 });
         let (took, crests) = write_bounds(&heights, &mut writer, &threads, progress)?;
         report.bounds_s = took.bounds_s;
         report.write_s += took.write_s;
         if let Some(light) = &options.light {
-            let left = options.memory_bytes - needed(&description.grid);
-            let heights = heights.with_cache(memory::cache_bytes(left));
+            let heights = if all {
+                heights
+            } else {
+                heights.with_cache(cache_bytes)
+            };
             let lit = Lit {
                 options: light,
                 earth: &earth,
