@@ -93,7 +93,7 @@ pub(super) fn trace(
 }
 
 /// All heights of level 0, a row of tiles at a time.
-fn read_level_0(file: &TerrainFile, progress: &dyn Progress) -> Result<Vec<f32>> {
+pub(super) fn read_level_0(file: &TerrainFile, progress: &dyn Progress) -> Result<Vec<f32>> {
     let size = file.grid().size;
     let mut heights = vec![f32::NAN; size.samples() as usize];
     progress.begin("read back", heights.len() as u64);

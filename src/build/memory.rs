@@ -16,6 +16,9 @@ pub const HELD_MEMORY_BYTES: u64 = 2 << 30;
 const BYTES_A_SAMPLE: u64 = 12;
 const BYTES_A_SAMPLE_WITH_LIGHT: u64 = 30;
 
+/// Bytes a sample takes where light over a day is traced: measured at 2048 x 2048.
+const BYTES_A_SAMPLE_WITH_DAY: u64 = 60;
+
 /// Bytes a column or row takes while light is traced: the table of a ray's crossings with cell edges.
 const BYTES_A_LINE_WITH_LIGHT: u64 = 320;
 
@@ -53,6 +56,16 @@ pub fn preprocess_bytes(grid: &Grid, light: bool, held_bytes: u64) -> u64 {
         .saturating_add(FIXED_BYTES);
     let light = if light { needed_bytes(grid, true) } else { 0 };
     passes.max(light).saturating_add(held_bytes)
+}
+
+/// The memory that preprocessing a DEM of `grid` with light over a day takes, in bytes, without what its source holds.
+pub(super) fn day_bytes(grid: &Grid) -> u64 {
+    let more = BYTES_A_SAMPLE_WITH_DAY.saturating_sub(BYTES_A_SAMPLE_WITH_LIGHT);
+    preprocess_bytes(grid, true, 0).max(
+        (grid.size.samples() as u64)
+            .saturating_mul(more)
+            .saturating_add(needed_bytes(grid, true)),
+    )
 }
 
 /// Refuses a DEM called `name` whose grid is impossible, or of which something needs more than `ceiling_bytes`.

@@ -4,20 +4,21 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::time::Instant;
 
+use super::day;
 use super::light::trace;
 use super::memory::{self, needed_bytes, peak_rss_bytes};
 use super::output::Output;
-use super::preprocess::{PreprocessOptions, PreprocessReport};
+use super::preprocess::{PreprocessOptions, PreprocessReport, check_day};
 use super::threads::Threads;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
-use crate::levels::{Arrival, Bounds, Levels, LightSample};
+use crate::levels::{Arrival, Bounds, DaySample, Levels, LightSample};
 use crate::light::Earth;
 use crate::progress::Progress;
 use crate::pyramid::{Filter, FilterKind};
 use crate::terrain::{self, LightMeta, Meta, TerrainFile};
 
-/// Makes the terrain file `out` of `file`, with the light that `options` say, or none, in place of its own. Heights and
+/// Makes the terrain file `out` of `file`, with the light and day that `options` say, or none, in place of its own. Heights and
 /// bounds are those of `file`, to the bit, and so are the bytes of their tiles where this version made them. `out` may
 /// be `file` itself, where `force` is set: it is replaced when the new file is whole.
 ///
@@ -37,7 +38,11 @@ pub fn relight(
     let filter = filter_of(file)?;
     if let Some(light) = &options.light {
         light.sun.check()?;
-        let needed = |grid: &Grid| needed_bytes(grid, true);
+        check_day(options)?;
+        let needed = |grid: &Grid| match options.day {
+            Some(_) => memory::day_bytes(grid),
+            None => needed_bytes(grid, true),
+        };
         memory::check(
             file.name(),
             grid,
@@ -64,9 +69,15 @@ pub fn relight(
             }
             None => Vec::new(),
         };
+        let traced = Instant::now();
+        let day = match &options.day {
+            Some(day) => day::trace(file, day, &earth, &filter, &threads, progress)?,
+            None => Vec::new(),
+        };
+        report.day_s = traced.elapsed().as_secs_f64();
         let written = Instant::now();
         let meta = describe(file, options, &earth);
-        let relit = Relit { file, light };
+        let relit = Relit { file, light, day };
         terrain::write(
             BufWriter::with_capacity(1 << 20, &target),
             &meta,
@@ -113,6 +124,7 @@ fn describe(file: &TerrainFile, options: &PreprocessOptions, earth: &Earth) -> M
         sun_altitude_deg: light.sun.altitude_deg,
         sky_directions: light.sky_directions,
     });
+    meta.day = options.day;
     meta.tool = terrain::TOOL.into();
     let earth = options.light.map(|_| *earth);
     Earth::assume(earth.as_ref(), meta.place.as_ref(), &meta.grid, &mut meta.assumed);
@@ -123,6 +135,7 @@ fn describe(file: &TerrainFile, options: &PreprocessOptions, earth: &Earth) -> M
 struct Relit<'a> {
     file: &'a TerrainFile,
     light: Vec<Vec<LightSample>>,
+    day: Vec<Vec<DaySample>>,
 }
 
 impl Levels for Relit<'_> {
@@ -143,12 +156,35 @@ impl Levels for Relit<'_> {
     }
 
     fn light(&self, level: u32, rect: Rect, out: &mut [LightSample]) -> Result<Arrival> {
-        let width = self.grid().level(level).width;
-        let rows = out.chunks_mut(rect.width().max(1) as usize);
-        for (z, row) in (rect.z0..rect.z1).zip(rows) {
-            let from = (z * width + rect.x0) as usize;
-            row.copy_from_slice(&self.light[level as usize][from..from + row.len()]);
-        }
+        copy(
+            &self.light[level as usize],
+            self.grid().level(level).width,
+            rect,
+            out,
+        );
         Ok(Arrival::Arrived)
+    }
+
+    fn has_day(&self) -> bool {
+        !self.day.is_empty()
+    }
+
+    fn day(&self, level: u32, rect: Rect, out: &mut [DaySample]) -> Result<Arrival> {
+        copy(
+            &self.day[level as usize],
+            self.grid().level(level).width,
+            rect,
+            out,
+        );
+        Ok(Arrival::Arrived)
+    }
+}
+
+/// Copies `rect` of samples that lie in rows of `width` into `out`.
+fn copy<T: Copy>(from: &[T], width: i64, rect: Rect, out: &mut [T]) {
+    let rows = out.chunks_mut(rect.width().max(1) as usize);
+    for (z, row) in (rect.z0..rect.z1).zip(rows) {
+        let first = (z * width + rect.x0) as usize;
+        row.copy_from_slice(&from[first..first + row.len()]);
     }
 }

@@ -19,6 +19,7 @@ use crate::progress::Progress;
 use crate::pyramid::{Filter, downsample};
 use crate::work::{Work, each_chunk};
 
+mod day;
 mod earth;
 mod fill;
 mod horizon;
@@ -29,6 +30,10 @@ mod sky;
 mod sun;
 mod sun_at;
 
+pub(crate) use day::disc_coefficients;
+pub use day::{
+    DAY_POSITIONS, Day, DayTrace, SunTime, day_levels, disc, disc_integral, sun_of_day, trace_day,
+};
 pub use earth::{DEFAULT_REFRACTION, Earth, middle};
 pub use fill::fill_voids;
 pub use horizon::{horizon_tangents, horizon_tangents_on};

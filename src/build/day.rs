@@ -1,0 +1,80 @@
+//! The fourth pass: light over a day traced over the heights of a terrain file, put as tiles where that was just written.
+//!
+//! Level 0 and all that is known of its day are held whole, which [`super::needed_bytes`] counts.
+
+use std::io::{Seek, Write};
+use std::time::Instant;
+
+use super::light::read_level_0;
+use super::tiles::{Tiles, put_tiles};
+use crate::error::Result;
+use crate::levels::{DaySample, Levels};
+use crate::light::{Day, Earth, day_levels, trace_day};
+use crate::progress::Progress;
+use crate::pyramid::Filter;
+use crate::terrain::layout::{Kind, TILE};
+use crate::terrain::{DAY_FIELDS, TerrainFile, TerrainWriter};
+use crate::work::Work;
+
+/// Traces the light of `day` over `heights` on `earth`, filters it into all levels and puts them. Returns the seconds of
+/// tracing and filtering, and of writing.
+///
+/// # Errors
+/// Those of tracing and of the file; [`crate::ErrorKind::Cancelled`].
+pub(super) fn write_day<W: Write + Seek + Sync + Send>(
+    heights: &TerrainFile,
+    writer: &mut TerrainWriter<W>,
+    day: &Day,
+    earth: &Earth,
+    filter: &Filter,
+    work: &dyn Work,
+    progress: &dyn Progress,
+) -> Result<[f64; 2]> {
+    let start = Instant::now();
+    let levels = trace(heights, day, earth, filter, work, progress)?;
+    let traced_s = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let grid = *heights.grid();
+    let order = writer.layout().order_of(Kind::Day);
+    progress.begin("write day", order.len() as u64);
+    for row in order {
+        let level = writer.layout().parts()[row.part].level;
+        let size = grid.level(level);
+        let rows = row.y * TILE..((row.y + 1) * TILE).min(size.height);
+        let samples =
+            &levels[level as usize][(rows.start * size.width) as usize..(rows.end * size.width) as usize];
+        let samples: Vec<[u16; 5]> = samples.iter().map(fields).collect();
+        let tiles = Tiles {
+            row,
+            width: size.width,
+            samples: &samples,
+            fields: DAY_FIELDS,
+        };
+        put_tiles(writer, &tiles, work, progress)?;
+        progress.advance(1);
+    }
+    Ok([traced_s, start.elapsed().as_secs_f64()])
+}
+
+/// A sample without what only fills its words.
+fn fields(sample: &DaySample) -> [u16; 5] {
+    let all: [u16; 6] = bytemuck::cast(*sample);
+    [all[0], all[1], all[2], all[3], all[4]]
+}
+
+/// The light over `day` of all levels of `heights` on `earth`.
+///
+/// # Errors
+/// Those of tracing and of the file; [`crate::ErrorKind::Cancelled`].
+pub(super) fn trace(
+    heights: &TerrainFile,
+    day: &Day,
+    earth: &Earth,
+    filter: &Filter,
+    work: &dyn Work,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<DaySample>>> {
+    let level_0 = read_level_0(heights, progress)?;
+    let traced = trace_day(&level_0, heights.grid(), earth, day, work, progress)?;
+    day_levels(heights.grid(), &level_0, traced, filter, work, progress)
+}
