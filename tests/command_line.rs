@@ -243,7 +243,7 @@ fn info_says_what_a_terrain_file_is_and_verify_finds_what_is_damaged() {
             .unwrap_or_else(|| panic!("no {name} in {json}"))
     };
     let documented = "format type width height spacing min max voids vertical_unit vertical_datum crs unit pixel origin \
-        extent registration levels light assumed noticed";
+        extent registration levels light day assumed noticed";
     let places: Vec<usize> = documented.split_whitespace().map(at).collect();
     assert!(places.is_sorted(), "{json}");
     assert_eq!(info.as_object().unwrap().len(), places.len(), "{json}");

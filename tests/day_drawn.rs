@@ -147,7 +147,7 @@ fn at_a_position_frames_are_those_of_a_file_made_for_that_sun() {
     let made = made();
     let time = made.day.time_of_position(made.position);
     // All of it at full resolution, and coarse levels from nearby on.
-    for (clip_size, wanted) in [(1024, 8.0), (64, 14.0)] {
+    for (clip_size, wanted) in [(1024, 6.0), (64, 8.0)] {
         let of_day = draw(&gpu, &made.with_day, clip_size, Some(time));
         let single = draw(&gpu, &made.single, clip_size, None);
         let [mean, rms] = difference(&of_day, &single);

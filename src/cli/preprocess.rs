@@ -55,20 +55,20 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
                 return Err(error.advice("give --lat and --lon").into());
             };
             let sun = Sun::at(moment, latitude_deg, longitude_deg)?;
+            day = args
+                .day
+                .map(|positions| Day::of(moment, latitude_deg, longitude_deg, positions))
+                .transpose()?;
             terminal.note(&format!(
                 "the sun stands at azimuth {:.2}, altitude {:.2} degrees, seen from {latitude_deg:.4}, {longitude_deg:.4}",
                 sun.azimuth_deg, sun.altitude_deg
             ));
-            if let Some(positions) = args.day {
-                let found = Day::of(moment, latitude_deg, longitude_deg, positions)?;
-                let end = found.half_s / 3600.0;
+            if let Some(day) = &day {
+                let hours = [-1.0, 1.0].map(|end| clock(day.hour_of_time(end)));
                 terminal.note(&format!(
                     "the day runs from {} to {} by the sun, its noon is {}",
-                    clock(12.0 - end),
-                    clock(12.0 + end),
-                    found.noon
+                    hours[0], hours[1], day.noon
                 ));
-                day = Some(found);
             }
             sun
         }
