@@ -1,14 +1,14 @@
 //! The fourth pass: light over a day traced over the heights of a terrain file, put as tiles where that was just written.
 //!
-//! Level 0 and all that is known of its day are held whole, which [`super::needed_bytes`] counts.
+//! Level 0 and all that is known of its day are held whole, which [`super::memory`] counts.
 
 use std::io::{Seek, Write};
 use std::time::Instant;
 
-use super::light::read_level_0;
 use super::tiles::{Tiles, put_tiles};
-use crate::error::Result;
-use crate::levels::{DaySample, Levels};
+use crate::error::{Error, Result};
+use crate::grid::Rect;
+use crate::levels::{Arrival, DaySample, Levels};
 use crate::light::{Day, Earth, day_levels, trace_day};
 use crate::progress::Progress;
 use crate::pyramid::Filter;
@@ -66,7 +66,7 @@ fn fields(sample: &DaySample) -> [u16; 5] {
 ///
 /// # Errors
 /// Those of tracing and of the file; [`crate::ErrorKind::Cancelled`].
-pub(super) fn trace(
+fn trace(
     heights: &TerrainFile,
     day: &Day,
     earth: &Earth,
@@ -77,4 +77,22 @@ pub(super) fn trace(
     let level_0 = read_level_0(heights, progress)?;
     let traced = trace_day(&level_0, heights.grid(), earth, day, work, progress)?;
     day_levels(heights.grid(), &level_0, traced, filter, work, progress)
+}
+
+/// All heights of level 0, a row of tiles at a time.
+fn read_level_0(file: &TerrainFile, progress: &dyn Progress) -> Result<Vec<f32>> {
+    let size = file.grid().size;
+    let mut heights = vec![f32::NAN; size.samples() as usize];
+    progress.begin("read back", heights.len() as u64);
+    let rows = heights.chunks_mut((TILE * size.width) as usize);
+    for (z0, rows) in (0..size.height).step_by(TILE as usize).zip(rows) {
+        if progress.cancelled() {
+            return Err(Error::cancelled(file.name()));
+        }
+        let rect = Rect::new(0, z0, size.width, (z0 + TILE).min(size.height));
+        let arrival = file.heights(0, rect, rows)?;
+        debug_assert_eq!(arrival, Arrival::Arrived, "a file has all of its tiles");
+        progress.advance(rows.len() as u64);
+    }
+    Ok(heights)
 }

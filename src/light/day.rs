@@ -29,8 +29,6 @@ use std::str::FromStr;
 use half::f16;
 
 use super::earth::Earth;
-use super::normal::Slopes;
-use super::relief::LANES;
 use super::sun_at::Moment;
 use super::{DISC_DEG, Sun, check, fill_voids, horizon_tangents_on, misuse};
 use crate::error::Result;
@@ -451,28 +449,51 @@ pub fn day_levels(
     Ok(levels)
 }
 
-/// The squared slope of the ground at every sample of level 0; NaN at voids.
+/// The squared slope of the ground at every sample of level 0, by central differences, one-sided at edges and beside
+/// voids; NaN at voids.
 fn squared_slopes(grid: &Grid, heights: &[f32], work: &dyn Work) -> Result<Vec<f32>> {
     check(grid, heights.len())?;
-    let slopes = Slopes::new(heights, grid);
-    let width = grid.size.width as usize;
+    let (width, height) = (grid.size.width as usize, grid.size.height as usize);
+    let per_m = grid.spacing_m.map(|m| (1.0 / m) as f32);
+    let slope = |before: Option<f32>, here: f32, after: Option<f32>, per_m: f32| {
+        let known = |h: Option<f32>| h.filter(|h| !h.is_nan());
+        match (known(before), known(after)) {
+            (Some(before), Some(after)) => 0.5 * (after - before) * per_m,
+            (None, Some(after)) => (after - here) * per_m,
+            (Some(before), None) => (here - before) * per_m,
+            (None, None) => 0.0,
+        }
+    };
     let mut squares = vec![0.0; heights.len()];
     each_chunk(work, &mut squares, width, |j, row| {
-        for (i, lanes) in (0..).step_by(LANES).zip(row.chunks_mut(LANES)) {
-            let [east, south] = slopes.rises([i, j], lanes.len());
-            for (k, square) in lanes.iter_mut().enumerate() {
-                // A cliff beyond what f16 holds is as steep.
-                *square = (east[k] * east[k] + south[k] * south[k]).min(4e9);
-                if heights[j * width + i + k].is_nan() {
-                    *square = f32::NAN;
-                }
-            }
+        let at = |i: usize, j: usize| heights[j * width + i];
+        for (i, square) in row.iter_mut().enumerate() {
+            let here = at(i, j);
+            let (west, east) = (
+                (i > 0).then(|| at(i - 1, j)),
+                (i + 1 < width).then(|| at(i + 1, j)),
+            );
+            let (north, south) = (
+                (j > 0).then(|| at(i, j - 1)),
+                (j + 1 < height).then(|| at(i, j + 1)),
+            );
+            let (e, s) = (
+                slope(west, here, east, per_m[0]),
+                slope(north, here, south, per_m[1]),
+            );
+            // A cliff beyond what f16 holds is as steep.
+            *square = if here.is_nan() {
+                f32::NAN
+            } else {
+                (e * e + s * s).min(4e9)
+            };
         }
     });
     Ok(squares)
 }
 
 /// Coefficients of [`disc`]: of x, x^3 and x^5.
+#[allow(clippy::approx_constant, reason = "the three are to sum to a half in f32 too")]
 const DISC: [f32; 3] = [0.636_62, -0.1017, -0.034_92];
 
 /// The coefficients of [`disc`]: of x, x^3 and x^5.
