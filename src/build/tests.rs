@@ -120,7 +120,7 @@ fn a_file_holds_what_the_pyramid_holds() {
             assert_eq!(meta.assumed, hills.description.assumed);
             assert_eq!(
                 (meta.filter.as_str(), meta.lobes, meta.rounding_step_m),
-                ("sinc-blackman", DEFAULT_LOBES, Some(1.0 / 64.0))
+                ("sinc-blackman", DEFAULT_LOBES, Some(1.0 / 4.0))
             );
             assert_eq!(
                 meta.light.map(|l| l.sky_directions),

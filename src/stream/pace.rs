@@ -19,8 +19,8 @@ use crate::levels::Data;
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     pub(super) shape: Shape,
-    /// Seconds of a loader a sample: heights, bounds of a patch, light.
-    pub(super) sample_s: [f64; 3],
+    /// Seconds of a loader a sample: heights, bounds of a patch, light, light over a day.
+    pub(super) sample_s: [f64; 4],
     pub(super) loaders: usize,
 }
 
@@ -42,12 +42,13 @@ impl Pace {
     pub fn fastest_m_s(&self, flown: &Flown) -> f64 {
         let n = flown.clip_size as f64;
         let whole = |n: f64, data: Data| n + (self.shape.side(data) - 1) as f64;
-        let [heights_s, bounds_s, light_s] = self.sample_s;
+        let [heights_s, bounds_s, light_s, day_s] = self.sample_s;
         let heights = |n: f64| whole(n, Data::Heights);
         let step_s = heights(n) * heights_s
-            + 2.0 * heights(2.0 * n) * (heights_s + light_s)
+            + 2.0 * heights(2.0 * n) * (heights_s + light_s + day_s)
             + whole(n / PATCH as f64, Data::Bounds) / PATCH as f64 * bounds_s;
-        let step_bytes = n * (4.0 + 4.0 * 8.0);
+        let light_bytes = if day_s > 0.0 { 16.0 } else { 8.0 };
+        let step_bytes = n * (4.0 + 4.0 * light_bytes);
         let spacing_m = self.shape.grid.spacing_m;
         let steps_a_metre: f64 = (0..flown.levels)
             .map(|l| 1.0 / (spacing_m[0].min(spacing_m[1]) * (1i64 << l) as f64))
@@ -73,7 +74,7 @@ mod tests {
                 levels: 8,
                 bounds_side: 256,
             },
-            sample_s: [sample_s, 0.0, 0.0],
+            sample_s: [sample_s, 0.0, 0.0, 0.0],
             loaders,
         };
         let flown = |budget| Flown {
