@@ -1,7 +1,7 @@
 // Draws patches of the clipmap: displaces their vertices, lights and colours their fragments.
 //
 // Vertices come from an index buffer over the 9 x 9 corners of a patch, instances are the selected patches. Still patches
-// (alpha is 0 on all of them) have a pipeline that looks up no coarser light, ragged ones (voids, the DEM's edge) the only
+// (alpha is 0 on all of them) have a pipeline that looks up nothing coarser, ragged ones (voids, the DEM's edge) the only
 // one that discards and that carries validity: what is interpolated is paid for with every triangle, so it is packed into
 // as few slots as it fits.
 #import shared/ground.wgsl

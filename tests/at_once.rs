@@ -24,6 +24,7 @@ const OPTIONS: ClipmapOptions = ClipmapOptions {
     transition: None,
     vertical_scale: 1.0,
     cull: false,
+    occlusion: true,
     max_error_px: None,
     wait: Wait::None,
     upload_budget_bytes: None,

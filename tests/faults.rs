@@ -25,6 +25,7 @@ const OPTIONS: ClipmapOptions = ClipmapOptions {
     transition: None,
     vertical_scale: 1.0,
     cull: false,
+    occlusion: true,
     max_error_px: None,
     wait: Wait::None,
     upload_budget_bytes: None,

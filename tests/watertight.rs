@@ -169,7 +169,7 @@ fn rough(width: i64, height: i64) -> Pyramid {
 }
 
 #[test]
-fn culling_leaves_out_only_what_is_not_seen() {
+fn culling_by_the_frustum_leaves_out_only_what_is_beside_the_picture() {
     let seed = seed(8);
     let mut random = Random(seed);
     let terrains = [rough(900, 700), rough(333, 1201)];
@@ -194,6 +194,7 @@ fn culling_leaves_out_only_what_is_not_seen() {
         let draw = |cull| {
             let options = ClipmapOptions {
                 cull,
+                occlusion: false,
                 vertical_scale: scale,
                 ..scene.options
             };

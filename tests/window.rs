@@ -107,9 +107,15 @@ struct Window<'a> {
 impl<'a> Window<'a> {
     /// Flies as a user would, and waits until there is a window that hears keys.
     fn open(screen: &'a Screen, arguments: &[&str]) -> Self {
+        Self::open_scaled(screen, arguments, 1.0)
+    }
+
+    /// The same on a screen whose points are `scale` pixels wide.
+    fn open_scaled(screen: &'a Screen, arguments: &[&str], scale: f64) -> Self {
         let mut program = Command::new(env!("CARGO_BIN_EXE_clipscape"))
             .arg("fly")
             .args(arguments)
+            .env("WINIT_X11_SCALE_FACTOR", scale.to_string())
             .env("DISPLAY", &screen.display)
             .env_remove("WAYLAND_DISPLAY")
             .env_remove("WAYLAND_SOCKET")
@@ -290,6 +296,68 @@ fn a_recorded_flight_is_replayed_to_the_picture_that_was_seen() {
         mean > MEAN_LIMIT && far > FAR_SHARE_LIMIT,
         "control, another pose: {mean} {far}"
     );
+}
+
+#[test]
+fn on_a_screen_of_fine_pixels_pictures_are_as_large_as_asked_for_and_the_window_is_resized() {
+    let Some(screen) = Screen::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let arguments = [
+        "synth:1024:3",
+        "--size",
+        "800x500",
+        "--clip-size",
+        "64",
+        "--output-dir",
+        out,
+    ];
+    let window = Window::open_scaled(&screen, &arguments, 2.0);
+    let (width, height, _) = pixels(&window.picture());
+    assert_eq!([width, height], [800, 500]);
+    let id = screen.send(&["search", "--onlyvisible", "--name", "^clipscape: "]);
+    let id = id.lines().next().expect("a window");
+    for size in [[333, 217], [1, 1], [900, 600]] {
+        let [w, h] = size.map(|s: u32| s.to_string());
+        screen.send(&["windowsize", "--sync", id, &w, &h]);
+        let (width, height, _) = pixels(&window.picture());
+        assert_eq!([width, height], size);
+    }
+    let (status, rest) = window.quit();
+    assert_eq!(status, Some(0), "{rest:?}");
+}
+
+#[test]
+fn a_lost_device_is_replaced_once_and_a_second_loss_ends_it() {
+    let Some(screen) = Screen::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let arguments = [
+        "synth:1024:3",
+        "--size",
+        "640x400",
+        "--clip-size",
+        "64",
+        "--loses-device",
+        "--output-dir",
+        out,
+    ];
+    let mut window = Window::open(&screen, &arguments);
+    let before = window.picture();
+    let line = window.press_until("F12", |line| line.contains("was lost"));
+    assert_eq!(line, "clipscape: The graphics device was lost, and replaced");
+    let after = window.picture();
+    let (mean, far) = difference(&before, &after);
+    assert!(
+        mean == 0.0 && far == 0.0,
+        "the same is seen as before: {mean} {far}"
+    );
+
+    let line = window.press_until("F12", |line| line.contains("was lost"));
+    assert!(line.contains("lost twice in short order"), "{line}");
+    assert!(line.contains("clipscape render"), "{line}");
+    let status = window.program.wait().unwrap();
+    assert_eq!(status.code(), Some(1));
 }
 
 /// Random keys, drags, wheel and clicks. What quits or fills the disk is left out; the clip size is, for it is meant to

@@ -48,8 +48,8 @@ for _ in $(seq "$rounds"); do
         -DECLINATION=3 -UNIT=1
     grass grassdata/PERMANENT --exec sh r.sh 1 >> grass.log 2>&1
     for side in 4096 2048; do
-        timed none$side.s "$own" preprocess --memory 2G $side.tif --no-light -q -f -o a.terrain.exr
-        timed sun$side.s "$own" preprocess --memory 2G $side.tif --sun 135,3 --sky-directions 0 -q -f -o a.terrain.exr --stats stats
+        timed none$side.s "$own" preprocess $side.tif --no-light -q -f -o a.terrain.exr
+        timed sun$side.s "$own" preprocess $side.tif --sun 135,3 --sky-directions 0 -q -f -o a.terrain.exr --stats stats
         sed 's/.*"sun_s":\([0-9.e-]*\).*/\1/' stats >> alone$side.s
     done
 done

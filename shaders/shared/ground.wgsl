@@ -4,7 +4,6 @@
 #import view colour
 #import surface function
 
-override MORPHS: bool = true;           // whether alpha may be other than 0: the coarser light is looked up
 override TRACED_LIGHT: bool = true;     // whether light texels hold traced light; else it follows from slopes
 override TINT: bool = true;             // whether the look tints the ground by height and slope
 override HAZE: bool = true;             // whether the look lays air between ground and eye

@@ -3,6 +3,8 @@
 // The vertex function's twin is `src/clipmap/vertex.rs`: same names, same order of steps. The structs are those of
 // `src/clipmap/constants.rs`, compared by a test. Nothing here is absolute: positions are samples from the eye.
 
+override MORPHS: bool = true;   // whether alpha may be other than 0: else no coarser level and nothing held is looked up
+
 struct ViewConstants {
     clip_from_east: vec4<f32>,  // clip coordinates of a metre to the east of the eye
     clip_from_up: vec4<f32>,
@@ -94,7 +96,7 @@ fn displace(origin: vec2<i32>, level: u32, fill: f32, corner: vec2<i32>) -> Vert
     let h = load_height(level, sample);
     var c0 = h;
     var c1 = h;
-    if constants.has_coarser != 0u {
+    if MORPHS && constants.has_coarser != 0u {
         alpha = max(ring(d), held(level, sample));
         // The coarse sample where both indices are even, else the ends of the edge or diagonal that holds the vertex.
         c0 = load_height(level + 1u, sample >> vec2(1u));

@@ -13,6 +13,7 @@ use super::tiles::{Tiles, put_tiles};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Rect, Size};
 use crate::levels::{Arrival, Levels};
+use crate::light::Crests;
 use crate::progress::Progress;
 use crate::pyramid::{BoundsRows, Rows, Share, measure};
 use crate::terrain::layout::{Kind, TILE};
@@ -28,7 +29,7 @@ pub(super) struct Took {
     pub(super) write_s: f64,
 }
 
-/// Puts the bounds of all levels, of the heights in `heights`.
+/// Puts the bounds of all levels, of the heights in `heights`, and returns how high these reach near each place.
 ///
 /// # Errors
 /// What the file meets; [`crate::ErrorKind::Cancelled`].
@@ -37,7 +38,7 @@ pub(super) fn write_bounds<W: Write + Seek + Sync + Send>(
     writer: &mut TerrainWriter<W>,
     work: &dyn Work,
     progress: &dyn Progress,
-) -> Result<Took> {
+) -> Result<(Took, Crests)> {
     let grid = *heights.grid();
     let Size { width, height } = grid.size;
     progress.begin("bounds", grid.size.samples() as u64);
@@ -45,6 +46,7 @@ pub(super) fn write_bounds<W: Write + Seek + Sync + Send>(
     let mut bounds = BoundsRows::new(&grid);
     let mut due = writer.layout().order_of(Kind::Bounds).into_iter().peekable();
     let mut took = Took::default();
+    let mut crests = Crests::new(&grid);
     for z0 in (0..height).step_by(TILE as usize) {
         if progress.cancelled() {
             return Err(Error::cancelled(heights.name()));
@@ -59,12 +61,13 @@ pub(super) fn write_bounds<W: Write + Seek + Sync + Send>(
             let block = Rect::new(x0, z0, x1, z1);
             let mut truth = vec![0.0; block.area() as usize];
             arrived(heights.heights(0, block, &mut truth)?);
-            Ok(measure(&grid, block, &truth, &rows))
+            let highest = Crests::measure(&truth, block.width() as usize);
+            Ok((block, highest, measure(&grid, block, &truth, &rows)))
         })?;
-        shares
-            .iter()
-            .flatten()
-            .for_each(|share: &Share| bounds.add(share));
+        for (block, highest, shares) in &shares {
+            crests.put(*block, highest);
+            shares.iter().for_each(|share: &Share| bounds.add(share));
+        }
         bounds.advance(z1);
         took.bounds_s += start.elapsed().as_secs_f64();
 
@@ -85,7 +88,7 @@ pub(super) fn write_bounds<W: Write + Seek + Sync + Send>(
         took.write_s += start.elapsed().as_secs_f64();
         progress.advance((width * (z1 - z0)) as u64);
     }
-    Ok(took)
+    Ok((took, crests))
 }
 
 /// Rows of a level above 0 that pass by.
@@ -153,7 +156,7 @@ impl Window {
 }
 
 /// What `task` makes of the columns of each tile, in their order.
-fn each_tile<T: Send>(
+pub(super) fn each_tile<T: Send>(
     width: i64,
     work: &dyn Work,
     task: impl Fn(i64, i64) -> Result<T> + Sync,

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Size};
+use crate::light::LightOptions;
 use crate::terrain::layout::TILE;
 
 /// The ceiling of preprocessing unless another is given: 512 MiB.
@@ -11,48 +12,78 @@ pub const DEFAULT_MEMORY_BYTES: u64 = 512 << 20;
 pub const HELD_MEMORY_BYTES: u64 = 2 << 30;
 
 /// Bytes a sample of level 0 takes at the peak where all is held: heights of all levels and their bounds alone (measured
-/// at 4096 x 4096 over a source that holds nothing: 6.8), or light and what tracing and filtering it take as well (22.3);
-/// and 4 for a source that holds its heights.
+/// at 4096 x 4096 over a source that holds nothing: 6.8), or light and what filtering it takes as well (22.3); and 4 for a
+/// source that holds its heights.
 const BYTES_A_SAMPLE: u64 = 12;
 const BYTES_A_SAMPLE_WITH_LIGHT: u64 = 30;
-
-/// Bytes a column or row takes while light is traced: the table of a ray's crossings with cell edges.
-const BYTES_A_LINE_WITH_LIGHT: u64 = 320;
 
 /// Bytes a column of level 0 takes in either pass of preprocessing: in the first two bands of the DEM (2 KiB), the rows of
 /// the coarser levels (1.4 KiB) and those under the kernels (0.2 KiB with 4 lobes); in the second the rows of the coarser
 /// levels (1.4 KiB) and of bounds (1.7 KiB), and while these are packed some of them twice.
 const BYTES_A_COLUMN: u64 = 4096;
 
-/// Bytes a tile of level 0 takes: its place in the file and its checks, twice, and those of the tiles above it.
-const BYTES_A_TILE: u64 = 64;
+/// And in the third, where light is traced: the shares of the rows that are traced together as they are traced and as
+/// rows (2 KiB), rows of level 0 that are not yet written (1.6 KiB), those of the coarser levels (1.3 KiB) and those under
+/// the kernels (0.3 KiB with 4 lobes).
+const BYTES_A_COLUMN_WITH_LIGHT: u64 = 5632;
 
-/// What does not depend on the DEM: the program, and tiles being compressed.
+/// Bytes a tile of level 0 takes: its place in the file and its checks, twice, and those of the tiles above it; with light
+/// its crests too, thrice while windows are made of them.
+const BYTES_A_TILE: u64 = 64;
+const BYTES_A_TILE_WITH_LIGHT: u64 = 256;
+
+/// What does not depend on the DEM: the program, and tiles being compressed; with light the terrain that blocks look at,
+/// and the tiles that are kept at least.
 const FIXED_BYTES: u64 = 64 << 20;
+const FIXED_BYTES_WITH_LIGHT: u64 = 96 << 20;
+
+/// Bytes of a direction in which light is traced: its crossings with cell edges, as far as they are kept.
+const BYTES_A_DIRECTION: u64 = 160 << 10;
+
+/// Decoded tiles that are kept while light is traced, at least.
+const LEAST_CACHE_BYTES: u64 = 16 << 20;
 
 /// The memory that the pyramid of a DEM of `grid` takes where it is held whole, in bytes.
 pub fn needed_bytes(grid: &Grid, light: bool) -> u64 {
-    let (a_sample, a_line) = if light {
-        (BYTES_A_SAMPLE_WITH_LIGHT, BYTES_A_LINE_WITH_LIGHT)
-    } else {
-        (BYTES_A_SAMPLE, 0)
-    };
     (grid.size.samples() as u64)
-        .saturating_mul(a_sample)
-        .saturating_add((grid.size.width + grid.size.height) as u64 * a_line)
+        .saturating_mul(if light {
+            BYTES_A_SAMPLE_WITH_LIGHT
+        } else {
+            BYTES_A_SAMPLE
+        })
         .saturating_add(FIXED_BYTES)
 }
 
 /// The memory that preprocessing a DEM of `grid` takes, in bytes, where its source holds `held_bytes`: whatever its
-/// height but for 64 bytes a tile, unless light is traced, for which level 0 and its light are held.
-pub fn preprocess_bytes(grid: &Grid, light: bool, held_bytes: u64) -> u64 {
+/// height but for some bytes a tile.
+pub fn preprocess_bytes(grid: &Grid, light: Option<&LightOptions>, held_bytes: u64) -> u64 {
+    let (a_column, a_tile, fixed) = match light {
+        None => (BYTES_A_COLUMN, BYTES_A_TILE, FIXED_BYTES),
+        Some(light) => (
+            BYTES_A_COLUMN_WITH_LIGHT,
+            BYTES_A_TILE_WITH_LIGHT,
+            FIXED_BYTES_WITH_LIGHT + u64::from(light.sky_directions) * BYTES_A_DIRECTION,
+        ),
+    };
     let tiles = grid.size.samples() as u64 / (TILE * TILE) as u64;
-    let passes = (grid.size.width as u64)
-        .saturating_mul(BYTES_A_COLUMN)
-        .saturating_add(tiles * BYTES_A_TILE)
-        .saturating_add(FIXED_BYTES);
-    let light = if light { needed_bytes(grid, true) } else { 0 };
-    passes.max(light).saturating_add(held_bytes)
+    (grid.size.width as u64)
+        .saturating_mul(a_column)
+        .saturating_add(tiles * a_tile)
+        .saturating_add(fixed)
+        .saturating_add(held_bytes)
+}
+
+/// The bytes of decoded tiles that are kept while light is traced, where `left_bytes` of the ceiling are left.
+pub(super) fn cache_bytes(left_bytes: u64) -> usize {
+    // Tiles and what becomes of their memory once they are let go.
+    usize::try_from(LEAST_CACHE_BYTES + left_bytes / 8 * 7).unwrap_or(usize::MAX)
+}
+
+/// The bytes of the heights of all levels of a DEM of `grid` as tiles that are kept, and a little more.
+pub(super) fn decoded_bytes(grid: &Grid) -> u64 {
+    (grid.size.samples() as u64)
+        .saturating_mul(6)
+        .saturating_add(1 << 20)
 }
 
 /// Refuses a DEM called `name` whose grid is impossible, or of which something needs more than `ceiling_bytes`.
@@ -99,24 +130,30 @@ mod tests {
     #[test]
     fn a_dem_above_the_ceiling_is_refused_with_the_number_it_needs() {
         let grid = Grid::new(13201, 13201, [1.0, 1.0]);
+        let light = LightOptions::default();
         let with = |light| move |grid: &Grid| preprocess_bytes(grid, light, 0);
-        let needed = preprocess_bytes(&grid, true, 0);
-        assert!(check("a.tif", &grid, with(true), needed, "or cut it").is_ok());
-        let error = check("a.tif", &grid, with(true), needed - 1, "or cut it").unwrap_err();
+        let needed = preprocess_bytes(&grid, Some(&light), 0);
+        assert!(check("a.tif", &grid, with(Some(&light)), needed, "or cut it").is_ok());
+        let error = check("a.tif", &grid, with(Some(&light)), needed - 1, "or cut it").unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Limit);
         let number = format!("{} MiB", needed.div_ceil(1 << 20));
         assert!(error.to_string().contains(&number), "{error}");
-        assert!(preprocess_bytes(&grid, false, 0) < needed);
+        assert!(preprocess_bytes(&grid, None, 0) < needed);
         let most = Grid::new(1 << 30, 1 << 30, [1.0, 1.0]);
-        assert_eq!(
-            preprocess_bytes(&most, true, 5),
-            u64::MAX,
-            "more than can be counted"
+        assert_eq!(needed_bytes(&most, true), u64::MAX, "more than can be counted");
+        assert!(
+            check(
+                "a.tif",
+                &most,
+                |grid| needed_bytes(grid, true),
+                u64::MAX - 1,
+                "or cut it"
+            )
+            .is_err()
         );
-        assert!(check("a.tif", &most, with(true), u64::MAX - 1, "or cut it").is_err());
         let none = Grid::new(i64::MAX, i64::MAX, [1.0, 1.0]);
         assert_eq!(
-            check("a.tif", &none, with(true), u64::MAX, "or cut it")
+            check("a.tif", &none, with(Some(&light)), u64::MAX, "or cut it")
                 .unwrap_err()
                 .kind(),
             ErrorKind::Misuse
@@ -124,11 +161,21 @@ mod tests {
     }
 
     #[test]
-    fn without_light_the_height_of_a_dem_costs_next_to_nothing() {
-        let of = |width, height| preprocess_bytes(&Grid::new(width, height, [1.0, 1.0]), false, 7);
-        assert_eq!(of(1000, 1 << 20) - of(1000, 1), (1000 << 20) / 65_536 * 64);
-        assert_eq!(of(65_536, 1), (64 << 20) + 65_536 * 4096 + 64 + 7);
-        assert!(of(65_536, 65_536) < 512 << 20);
+    fn the_height_of_a_dem_costs_next_to_nothing() {
+        for (light, a_tile, fixed, a_column) in [
+            (None, 64, 64 << 20, 4096),
+            (
+                Some(&LightOptions::default()),
+                256,
+                (96 << 20) + 16 * (160 << 10),
+                5632,
+            ),
+        ] {
+            let of = |width, height| preprocess_bytes(&Grid::new(width, height, [1.0, 1.0]), light, 7);
+            assert_eq!(of(1000, 1 << 20) - of(1000, 1), (1000 << 20) / 65_536 * a_tile);
+            assert_eq!(of(65_536, 1), fixed + 65_536 * a_column + a_tile + 7);
+            assert!(of(65_536, 65_536) < 512 << 20);
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::bands::BAND_ROWS;
 use super::bounds::write_bounds;
 use super::heights::write_heights;
-use super::light::write_light;
+use super::light::{Lit, write_light};
 use super::memory::{self, DEFAULT_MEMORY_BYTES, HELD_MEMORY_BYTES, peak_rss_bytes, preprocess_bytes};
 use super::output::Output;
 use super::threads::Threads;
@@ -112,9 +112,8 @@ pub fn preprocess(
     }
     let earth = Earth::of(&description.grid, description.place.as_ref(), options.curvature)
         .map_err(|e| e.about(&description.name))?;
-    let light = options.light.is_some();
-    let needed = |grid: &Grid| preprocess_bytes(grid, light, source.held_bytes());
-    let advice = if light {
+    let needed = |grid: &Grid| preprocess_bytes(grid, options.light.as_ref(), source.held_bytes());
+    let advice = if options.light.is_some() {
         "leave out the light, or cut the DEM"
     } else {
         "or cut the DEM"
@@ -162,21 +161,26 @@ pub fn preprocess(
 
         let name = out.display().to_string();
         let heights = writer.readable(&name, &meta, || source::open_file(output.temporary()))?;
-        // Each pass reads a tile once.
-        let heights = heights.with_cache(0);
-        let took = write_bounds(&heights, &mut writer, &threads, progress)?;
+        // Each pass reads a tile once, so that nothing is kept unless all of it can be, for light to be traced over.
+        let left = options.memory_bytes - needed(&description.grid);
+        let cache_bytes = options.light.map_or(0, |_| memory::cache_bytes(left));
+        let all = memory::decoded_bytes(&description.grid) <= cache_bytes as u64;
+        let heights = heights.with_cache(if all { cache_bytes } else { 0 });
+        let (took, crests) = write_bounds(&heights, &mut writer, &threads, progress)?;
         report.bounds_s = took.bounds_s;
         report.write_s += took.write_s;
         if let Some(light) = &options.light {
-            let took = write_light(
-                &heights,
-                &mut writer,
-                light,
-                &earth,
-                &options.filter,
-                &threads,
-                progress,
-            )?;
+            let heights = if all {
+                heights
+            } else {
+                heights.with_cache(cache_bytes)
+            };
+            let lit = Lit {
+                options: light,
+                earth: &earth,
+                filter: &options.filter,
+            };
+            let took = write_light(&heights, crests, &mut writer, &lit, &threads, progress)?;
             (report.sun_s, report.sky_s) = (took.sun_s, took.sky_s);
             report.write_s += took.write_s;
         }
@@ -206,11 +210,10 @@ pub fn preprocess(
 /// meets.
 pub fn build_pyramid(source: &dyn HeightSource, filter: &Filter, progress: &dyn Progress) -> Result<Pyramid> {
     let description = source.description();
-    let needed = |grid: &Grid| memory::needed_bytes(grid, false);
     memory::check(
         &description.name,
         &description.grid,
-        needed,
+        |grid| memory::needed_bytes(grid, false),
         HELD_MEMORY_BYTES,
         "preprocess it, or cut it",
     )?;

@@ -4,18 +4,19 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::time::Instant;
 
-use super::light::trace;
-use super::memory::{self, needed_bytes, peak_rss_bytes};
+use super::light::{Lit, crests, write_light};
+use super::memory::{self, peak_rss_bytes, preprocess_bytes};
 use super::output::Output;
 use super::preprocess::{PreprocessOptions, PreprocessReport};
 use super::threads::Threads;
+use super::tiles::put_checks;
 use crate::error::{Error, ErrorKind, Result};
-use crate::grid::{Grid, Rect};
-use crate::levels::{Arrival, Bounds, Levels, LightSample};
+use crate::grid::Grid;
 use crate::light::Earth;
 use crate::progress::Progress;
 use crate::pyramid::{Filter, FilterKind};
-use crate::terrain::{self, LightMeta, Meta, TerrainFile};
+use crate::terrain::layout::Kind;
+use crate::terrain::{self, DEFAULT_CACHE_BYTES, LightMeta, Meta, TerrainFile, TerrainWriter};
 
 /// Makes the terrain file `out` of `file`, with the light that `options` say, or none, in place of its own. Heights and
 /// bounds are those of `file`, to the bit, and so are the bytes of their tiles where this version made them. `out` may
@@ -37,7 +38,8 @@ pub fn relight(
     let filter = filter_of(file)?;
     if let Some(light) = &options.light {
         light.sun.check()?;
-        let needed = |grid: &Grid| needed_bytes(grid, true);
+        // The file's own cache is what holds tiles.
+        let needed = |grid: &Grid| preprocess_bytes(grid, Some(light), DEFAULT_CACHE_BYTES as u64);
         memory::check(
             file.name(),
             grid,
@@ -56,30 +58,47 @@ pub fn relight(
         ..PreprocessReport::default()
     };
     let steps = |report: &mut PreprocessReport| -> Result<()> {
-        let light = match &options.light {
-            Some(light) => {
-                let (light, took) = trace(file, light, &earth, &filter, &threads, progress)?;
-                (report.sun_s, report.sky_s) = (took.sun_s, took.sky_s);
-                light
-            }
-            None => Vec::new(),
+        let named = |e: Error| match e.subject() {
+            "terrain file" => e.about(out.display()),
+            _ => e,
         };
         let written = Instant::now();
         let meta = describe(file, options, &earth);
-        let relit = Relit { file, light };
-        terrain::write(
-            BufWriter::with_capacity(1 << 20, &target),
-            &meta,
-            &relit,
-            &threads,
-            progress,
-        )
-        .map_err(|e| match e.subject() {
-            "terrain file" => e.about(out.display()),
-            _ => e,
-        })?;
-        output.publish(&target)?;
+        let buffered = BufWriter::with_capacity(1 << 20, &target);
+        let mut writer = TerrainWriter::new(buffered, &meta).map_err(named)?;
+        let mut rows = writer.layout().order();
+        rows.retain(|row| {
+            matches!(
+                writer.layout().parts()[row.part].kind,
+                Kind::Height | Kind::Bounds
+            )
+        });
+        let tiles: i64 = rows
+            .iter()
+            .map(|row| writer.layout().parts()[row.part].tiles().width)
+            .sum();
+        progress.begin("copy", tiles as u64);
+        writer.copy(rows, file, &threads, progress).map_err(named)?;
         report.write_s = written.elapsed().as_secs_f64();
+        if let Some(light) = &options.light {
+            let start = Instant::now();
+            let crests = crests(file, &threads, progress)?;
+            report.sun_s = start.elapsed().as_secs_f64();
+            let lit = Lit {
+                options: light,
+                earth: &earth,
+                filter: &filter,
+            };
+            let took = write_light(file, crests, &mut writer, &lit, &threads, progress).map_err(named)?;
+            report.sun_s += took.sun_s;
+            report.sky_s = took.sky_s;
+            report.write_s += took.write_s;
+        }
+        let written = Instant::now();
+        put_checks(&mut writer, &threads, progress).map_err(named)?;
+        writer.finish().map_err(named)?;
+        output.publish(&target)?;
+        report.write_s += written.elapsed().as_secs_f64();
         Ok(())
     };
     match steps(&mut report) {
@@ -117,38 +136,4 @@ fn describe(file: &TerrainFile, options: &PreprocessOptions, earth: &Earth) -> M
     let earth = options.light.map(|_| *earth);
     Earth::assume(earth.as_ref(), meta.place.as_ref(), &meta.grid, &mut meta.assumed);
     meta
-}
-
-/// A terrain file with other light, or none.
-struct Relit<'a> {
-    file: &'a TerrainFile,
-    light: Vec<Vec<LightSample>>,
-}
-
-impl Levels for Relit<'_> {
-    fn grid(&self) -> &Grid {
-        self.file.grid()
-    }
-
-    fn heights(&self, level: u32, rect: Rect, out: &mut [f32]) -> Result<Arrival> {
-        self.file.heights(level, rect, out)
-    }
-
-    fn bounds(&self, level: u32, patches: Rect, out: &mut [Bounds]) -> Result<Arrival> {
-        self.file.bounds(level, patches, out)
-    }
-
-    fn has_light(&self) -> bool {
-        !self.light.is_empty()
-    }
-
-    fn light(&self, level: u32, rect: Rect, out: &mut [LightSample]) -> Result<Arrival> {
-        let width = self.grid().level(level).width;
-        let rows = out.chunks_mut(rect.width().max(1) as usize);
-        for (z, row) in (rect.z0..rect.z1).zip(rows) {
-            let from = (z * width + rect.x0) as usize;
-            row.copy_from_slice(&self.light[level as usize][from..from + row.len()]);
-        }
-        Ok(Arrival::Arrived)
-    }
 }

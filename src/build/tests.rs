@@ -147,7 +147,13 @@ fn streamed_and_plain(hills: &Hills, options: &PreprocessOptions) -> (Vec<u8>, V
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("a.terrain.exr");
     preprocess(hills, &out, options, &Silent).unwrap();
-    let pyramid = build_pyramid(hills, &options.filter, &Silent).unwrap();
+    let mut pyramid = build_pyramid(hills, &options.filter, &Silent).unwrap();
+    if let Some(light) = &options.light {
+        let heights = pyramid.level(0).to_vec();
+        let grid = hills.description.grid;
+        let traced = trace_light(&grid, &heights, light, &options.filter, &Serial, &Silent).unwrap();
+        pyramid.set_light(traced).unwrap();
+    }
     let plain = std::io::Cursor::new(Vec::new());
     let plain = crate::terrain::write(plain, open(&out).meta(), &pyramid, &Serial, &Silent).unwrap();
     (fs::read(out).unwrap(), plain.into_inner())
@@ -168,22 +174,44 @@ fn any_ceiling_and_any_threads_give_the_bytes_of_the_plain_version() {
         (20, 5000),
         (600, 1400),
     ];
+    let low = |sky_directions| LightOptions {
+        sun: crate::light::Sun {
+            azimuth_deg: 190.0,
+            altitude_deg: 4.0,
+        },
+        sky_directions,
+    };
     for (width, height) in sizes {
-        for (voids, coast) in [(0, 0), (30, 0), (3, 40)] {
+        for (voids, coast, light) in [
+            (0, 0, None),
+            (30, 0, None),
+            (3, 40, None),
+            (0, 0, Some(low(3))),
+            (30, 0, Some(low(0))),
+            (
+                3,
+                40,
+                Some(LightOptions {
+                    sky_directions: 1,
+                    ..Default::default()
+                }),
+            ),
+        ] {
             let hills = Hills {
                 voids,
                 coast,
                 ..Hills::new(width, height)
             };
-            let lowest = preprocess_bytes(&hills.description.grid, false, 0);
+            let lowest = preprocess_bytes(&hills.description.grid, light.as_ref(), 0);
             let mut first = None;
             for (threads, memory_bytes) in [(1, lowest), (2, lowest), (1, 4 << 30), (2, 4 << 30)] {
                 let options = PreprocessOptions {
-                    light: None,
+                    light,
                     memory_bytes,
                     ..options(threads)
                 };
-                let case = format!("{width} x {height}, voids {voids}, coast {coast}, {threads} threads");
+                let case =
+                    format!("{width} x {height}, voids {voids}, coast {coast}, {light:?}, {threads} threads");
                 let (streamed, plain) = streamed_and_plain(&hills, &options);
                 assert!(streamed == plain, "{case}");
                 assert!(
@@ -309,7 +337,7 @@ fn cancelled_anywhere_nothing_is_left() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("a.terrain.exr");
     let mut cancelled = 0;
-    for n in (0..).step_by(19) {
+    for n in (0..).step_by(7) {
         match preprocess(&hills, &out, &options(1), &CancelAt(AtomicUsize::new(0), n)) {
             Ok(_) => break,
             Err(error) => {
@@ -354,7 +382,7 @@ fn errors_are_one_line_and_leave_nothing() {
     };
     let error = error_of(&whole, &out, &little);
     assert_eq!(error.kind(), ErrorKind::Limit);
-    let needed = preprocess_bytes(&whole.description.grid, true, 0).div_ceil(1 << 20);
+    let needed = preprocess_bytes(&whole.description.grid, options(1).light.as_ref(), 0).div_ceil(1 << 20);
     assert!(
         error.to_string().contains(&format!("need {needed} MiB")),
         "{error}"

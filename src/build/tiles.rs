@@ -36,14 +36,31 @@ pub(super) fn put_tiles<W: Write + Seek + Sync + Send, T: Pod + Sync, const N: u
     progress: &dyn Progress,
 ) -> Result<()> {
     let Tiles { row, width, .. } = *tiles;
+    put_packed(writer, row, size_of::<[T; N]>(), work, progress, |x| {
+        let columns = x * TILE..((x + 1) * TILE).min(width);
+        crate::terrain::pack_columns(tiles.samples, width, columns, tiles.fields)
+    })
+}
+
+/// Compresses and puts a row of tiles from west to east, of `sample_bytes` a sample; `pack` makes the decoded samples of
+/// tile number x of it.
+///
+/// # Errors
+/// What the file meets; [`crate::ErrorKind::Cancelled`].
+pub(super) fn put_packed<W: Write + Seek + Sync + Send>(
+    writer: &mut TerrainWriter<W>,
+    row: TileRow,
+    sample_bytes: usize,
+    work: &dyn Work,
+    progress: &dyn Progress,
+    pack: impl Fn(i64) -> Vec<u8> + Sync,
+) -> Result<()> {
     let count = writer.layout().parts()[row.part].tiles().width;
-    let batch = (BATCH_BYTES / (TILE * TILE) as usize / size_of::<[T; N]>()).max(1) as i64;
+    let batch = (BATCH_BYTES / (TILE * TILE) as usize / sample_bytes).max(1) as i64;
     for from in (0..count).step_by(batch as usize) {
         let until = (from + batch).min(count);
         let encoded = each_tile(from, until, work, progress, |x| {
-            let columns = x * TILE..((x + 1) * TILE).min(width);
-            let bytes = crate::terrain::pack_columns(tiles.samples, width, columns, tiles.fields);
-            writer.encode(row.part, x, row.y, bytes)
+            writer.encode(row.part, x, row.y, pack(x))
         })?;
         for tile in encoded {
             writer.put(tile)?;

@@ -52,6 +52,7 @@ pub(super) fn run(args: &FlyArgs, terminal: &Terminal) -> Outcome {
         folder: folder(&args.output_dir),
         stem: stem(&inputs[0]),
         replay: replay(&inputs, !args.read.options().is_default()),
+        loses_device: args.loses_device,
     };
     let read = args.read.options();
     let sun = args.view.sun;

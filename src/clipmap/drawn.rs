@@ -13,7 +13,8 @@
 use std::sync::OnceLock;
 
 use super::eye::Eye;
-use super::selection::{Instance, Scene, hull};
+use super::scene::{Scene, hull};
+use super::selection::Instance;
 use super::vertex::displace;
 use super::{Clipmap, no_frame};
 use crate::error::Result;

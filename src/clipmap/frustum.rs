@@ -51,22 +51,44 @@ impl Frustum {
         }
     }
 
+    /// A bit for each plane.
+    pub(super) const ALL: u8 = (1 << 6) - 1;
+
     /// Whether the box from `low` to `high` (metres from the eye) is seen nowhere. Infinite extents are never outside
     /// by their infinite side.
     pub fn excludes(&self, low: DVec3, high: DVec3) -> bool {
-        self.planes.iter().any(|plane| {
-            let (mut inward, mut extent) = (plane.inside, plane.inside.abs());
+        self.cutting(low, high, Self::ALL).is_none()
+    }
+
+    /// Which of `planes` (a bit for each) cut through the box from `low` to `high`: those that it is not wholly inside
+    /// of. What lies within a box is cut by no other planes than it. None where the box is seen nowhere.
+    pub(super) fn cutting(&self, low: DVec3, high: DVec3, planes: u8) -> Option<u8> {
+        let mut cutting = 0;
+        for (k, plane) in self
+            .planes
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| planes >> k & 1 == 1)
+        {
+            let (mut most, mut extent) = (plane.inside, plane.inside.abs());
+            let mut least = plane.inside;
             for axis in 0..3 {
                 if plane.extent[axis] == 0.0 {
                     continue; // 0 times an infinite extent would be NaN
                 }
                 extent += plane.extent[axis] * low[axis].abs().max(high[axis].abs());
                 if plane.normal[axis] != 0.0 {
-                    inward += (plane.normal[axis] * low[axis]).max(plane.normal[axis] * high[axis]);
+                    let ends = [plane.normal[axis] * low[axis], plane.normal[axis] * high[axis]];
+                    most += ends[0].max(ends[1]);
+                    least += ends[0].min(ends[1]);
                 }
             }
-            inward < -SLACK * extent
-        })
+            if most < -SLACK * extent {
+                return None;
+            }
+            cutting |= u8::from(least.is_nan() || least < 0.0) << k;
+        }
+        Some(cutting)
     }
 
     /// A bit for each plane that a point lies outside of, by the same share of its own extent. What hangs together

@@ -4,23 +4,30 @@
 //! what that exposes), then selects the patches to draw. The GPU holds copies of the windows' mirrors and draws the
 //! [`Selection`]; it knows nothing more.
 
+mod access;
 pub mod alpha;
 mod arrivals;
 mod certificate;
+mod clearance;
 mod constants;
 mod drawn;
 mod extent;
 mod eye;
 mod fit;
 mod frustum;
+mod gaps;
 mod ground;
 mod held;
 mod identity;
 mod missing;
 mod need;
+mod occlusion;
 mod options;
 mod plan;
+mod range;
 mod relief;
+mod report;
+mod scene;
 mod screen;
 mod selection;
 mod stray;
@@ -43,56 +50,32 @@ pub use frustum::Frustum;
 pub use held::{FADE_S, HeldField};
 pub use options::{ClipmapOptions, MAX_ERROR_PX, MAX_VERTICAL_SCALE};
 pub use plan::{HEIGHT_BYTES, LIGHT_BYTES, LevelPlan, UpdatePlan, exposed_bytes};
+pub use range::height_range_m;
 pub(crate) use relief::light_texels;
+pub use report::UpdateReport;
+pub use scene::Scene;
 pub use screen::Screen;
-pub use selection::{CLOSER_TRIANGLES, Instance, PATCH_TRIANGLES, Scene, Selection, Side};
+pub use selection::{CLOSER_TRIANGLES, Instance, PATCH_TRIANGLES, Selection, Side};
 pub use vertex::{Vertex, displace};
 pub use window::{LightTexel, PatchInfo, Window};
 
 use crate::camera::View;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Grid;
-use crate::levels::{Arrival, Bounds, Data, Levels, Wanted};
+use crate::levels::Levels;
 use arrivals::{Arrivals, Course};
 use extent::Extent;
 use ground::Ground;
 use held::{FadeReport, Moment};
 use identity::Identity;
 use need::Dial;
+use occlusion::Slack;
+use range::range_of;
 use succession::Successor;
 use window::Scratch;
 
 /// Seconds of flight for which what windows will gain is wanted beforehand, without waiting.
 const AHEAD_S: f64 = 1.0;
-
-/// What an update did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct UpdateReport {
-    /// Rectangles to upload.
-    pub uploads: u64,
-    /// Their bytes.
-    pub upload_bytes: u64,
-    /// The bytes that the windows' moves exposed, computed from the windows alone.
-    pub upload_bytes_exposed: u64,
-    /// Patches drawn.
-    pub patches: u64,
-    /// Subtrees of patches that were dropped because they are not seen.
-    pub patches_culled: u64,
-    /// Triangles drawn.
-    pub triangles: u64,
-    /// Levels of which something is drawn.
-    pub levels_drawn: u32,
-    /// Whether all data that the frame should show are there, and have faded in.
-    pub complete: bool,
-    /// Levels of which something is drawn coarser than it would be if its data had been there in time.
-    pub stale_levels: u32,
-    /// Patches whose detail vanished at once, because their data came too late to be taken back gently.
-    pub pops: u64,
-    /// Whether coarser levels were left out by [`ClipmapOptions::levels`], so that the picture ends at a border.
-    pub cut: bool,
-    /// Whether some of what is resident stands in for data that are not there yet.
-    pub provisional: bool,
-}
 
 /// The clipmap of one view.
 #[derive(Clone, Debug)]
@@ -102,6 +85,7 @@ pub struct Clipmap {
     ring: Ring,
     vertical_scale: f64,
     cull: bool,
+    occlusion: bool,
     max_error_px: Option<f64>,
     levels_asked: Option<u32>,
     cut: bool,
@@ -152,6 +136,7 @@ impl Clipmap {
             ring,
             vertical_scale: options.vertical_scale,
             cull: options.cull,
+            occlusion: options.occlusion,
             max_error_px: options.max_error_px,
             levels_asked: options.levels,
             cut: count < fitting,
@@ -197,6 +182,7 @@ impl Clipmap {
             self.ring = ring;
             self.vertical_scale = options.vertical_scale;
             self.cull = options.cull;
+            self.occlusion = options.occlusion;
             self.max_error_px = options.max_error_px;
             self.upload_budget_bytes = options.upload_budget_bytes;
         }
@@ -237,6 +223,7 @@ impl Clipmap {
             }
         }
         let fades = self.read_and_fade(levels, &eye, time_s)?;
+        gaps::hand_up(&mut self.windows);
         let ground = Ground {
             windows: &self.windows,
             grid: &self.grid,
@@ -271,6 +258,9 @@ impl Clipmap {
             self.held.dial(&self.windows, &dial);
         }
         let frustum = Frustum::new(view);
+        let greatest_m = self.range_m.map(|m| f64::from(m).abs());
+        let greatest_m = greatest_m[0].max(greatest_m[1]) + eye.height_m.abs();
+        let slack = Slack::new(&screen, greatest_m * self.vertical_scale.abs());
         self.selection.select(&Scene {
             grid: &self.grid,
             ring: &self.ring,
@@ -279,6 +269,7 @@ impl Clipmap {
             levels: &self.level_constants,
             held: &self.held,
             frustum: self.cull.then_some(&frustum),
+            occlusion: (self.cull && self.occlusion).then_some(slack),
             vertical_scale: self.vertical_scale,
         });
         self.eye = Some(eye);
@@ -383,151 +374,9 @@ impl Clipmap {
     pub fn take_faults(&mut self) -> Vec<Error> {
         self.arrivals.take_faults()
     }
-
-    /// A number that no other clipmap of this process has, clones included.
-    pub fn identity(&self) -> u64 {
-        self.identity.get()
-    }
-
-    /// Where the samples lie.
-    pub fn grid(&self) -> &Grid {
-        &self.grid
-    }
-
-    /// Clip size and transition.
-    pub fn ring(&self) -> &Ring {
-        &self.ring
-    }
-
-    /// Factor on heights relative to the eye.
-    pub fn vertical_scale(&self) -> f64 {
-        self.vertical_scale
-    }
-
-    /// Whether the light texels hold traced light.
-    pub fn has_light(&self) -> bool {
-        self.has_light
-    }
-
-    /// Least and greatest height of the DEM in metres above its base; 0 where it has none.
-    pub fn height_range_m(&self) -> [f32; 2] {
-        self.range_m
-    }
-
-    /// The windows, finest first.
-    pub fn windows(&self) -> &[Window] {
-        &self.windows
-    }
-
-    /// What holds levels back from being drawn.
-    pub fn held(&self) -> &HeldField {
-        &self.held
-    }
-
-    /// The same, to break it on purpose: controls of tests.
-    #[doc(hidden)]
-    pub fn held_mut(&mut self) -> &mut HeldField {
-        &mut self.held
-    }
-
-    /// What the last update wrote.
-    pub fn plan(&self) -> &UpdatePlan {
-        &self.plan
-    }
-
-    /// Counts updates: [`Clipmap::plan`] leads from the one before to this one.
-    pub fn generation(&self) -> u64 {
-        self.generation
-    }
-
-    /// The frame's constants.
-    pub fn view_constants(&self) -> &ViewConstants {
-        &self.view_constants
-    }
-
-    /// The levels' constants, finest first.
-    pub fn level_constants(&self) -> &[LevelConstants] {
-        &self.level_constants
-    }
-
-    /// The patches to draw.
-    pub fn selection(&self) -> &Selection {
-        &self.selection
-    }
-
-    /// The promised error in pixels, where one is.
-    pub fn max_error_px(&self) -> Option<f64> {
-        self.max_error_px
-    }
-
-    /// The selection's scene of the last update, without a frustum; none before the first, and after one that failed.
-    fn scene(&self) -> Option<Scene<'_>> {
-        Some(Scene {
-            grid: &self.grid,
-            ring: &self.ring,
-            eye: self.eye.as_ref()?,
-            windows: &self.windows,
-            levels: &self.level_constants,
-            held: &self.held,
-            frustum: None,
-            vertical_scale: self.vertical_scale,
-        })
-    }
-
-    /// The eye of the last update; none before the first, and after one that failed.
-    pub fn eye(&self) -> Option<&Eye> {
-        self.eye.as_ref()
-    }
-
-    /// What the GPU is told of a frame, to be broken on purpose by tests whose controls must catch it.
-    #[doc(hidden)]
-    pub fn frame_mut(&mut self) -> (&mut ViewConstants, &mut [LevelConstants], &mut Selection) {
-        (
-            &mut self.view_constants,
-            &mut self.level_constants,
-            &mut self.selection,
-        )
-    }
-
-    /// What the last update did.
-    pub fn report(&self) -> &UpdateReport {
-        &self.report
-    }
 }
 
 /// That a clipmap has no frame to speak of.
 fn no_frame(what: &str) -> Error {
     Error::new(ErrorKind::Misuse, "clipmap", format!("there is no frame {what}")).advice("update it first")
-}
-
-/// The same of what a window knows, where that is anything.
-fn range_of(window: &Window) -> Option<[f32; 2]> {
-    let patches = window.known_patches();
-    let (low, high) = patches.fold((f32::NAN, f32::NAN), |(low, high), p| {
-        (low.min(p.bounds.need_min), high.max(p.bounds.need_max))
-    });
-    (low <= high).then_some([low, high])
-}
-
-/// The least and greatest height of a DEM in metres above its base, from the saturated bounds of its coarsest level, which
-/// are few; 0 where it has none.
-///
-/// # Errors
-/// Those of `levels`; [`ErrorKind::Unsupported`] where those bounds are not there.
-pub fn height_range_m(levels: &dyn Levels) -> Result<[f32; 2]> {
-    let coarsest = levels.level_count() - 1;
-    let patches = levels.grid().patches(coarsest).rect();
-    let mut bounds = vec![Bounds::VOID; patches.area() as usize];
-    levels.wait_for(&[Wanted {
-        data: Data::Bounds,
-        level: coarsest,
-        rect: patches,
-    }]);
-    if levels.bounds(coarsest, patches, &mut bounds)? == Arrival::Missing {
-        let what = "the bounds of its coarsest level are not there";
-        return Err(Error::new(ErrorKind::Unsupported, "terrain", what).advice("wait for them first"));
-    }
-    let low = bounds.iter().fold(f32::NAN, |low, b| low.min(b.need_min));
-    let high = bounds.iter().fold(f32::NAN, |high, b| high.max(b.need_max));
-    Ok(if low.is_nan() { [0.0, 0.0] } else { [low, high] })
 }

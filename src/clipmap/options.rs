@@ -24,8 +24,12 @@ pub struct ClipmapOptions {
     pub transition: Option<i64>,
     /// Factor on heights relative to the eye; may be 0 or negative, within [`MAX_VERTICAL_SCALE`] of 0.
     pub vertical_scale: f64,
-    /// Whether patches that are not seen are left out.
+    /// Whether patches that are not seen are left out: those beside the picture and, if [`ClipmapOptions::occlusion`] is
+    /// set, those behind nearer ground.
     pub cull: bool,
+    /// Whether what nearer ground hides counts as not seen. To be cleared where ground is looked through: where a surface
+    /// function of the caller's discards, or what it returns is blended.
+    pub occlusion: bool,
     /// The promised error in pixels: detail that it does not need is left out; none draws all that the rings reach.
     pub max_error_px: Option<f64>,
     /// Whether frames wait for their data.
@@ -43,6 +47,7 @@ impl Default for ClipmapOptions {
             transition: None,
             vertical_scale: 1.0,
             cull: true,
+            occlusion: true,
             max_error_px: None,
             wait: Wait::All,
             upload_budget_bytes: None,

@@ -43,6 +43,8 @@ use crate::grid::Grid;
 pub struct Screen {
     /// The greatest stretch from tangents to pixels: the focal length in pixels where pixels are square.
     focal_px: f64,
+    /// The least stretch.
+    least_focal_px: f64,
     /// Unit vector along the view axis: east, up, south.
     axis: DVec3,
     /// Cosine of the widest angle between the axis and what is seen.
@@ -79,19 +81,30 @@ impl Screen {
         let [x, y, axis] = view.clip_rows();
         let half_px = view.size_px.map(|s| f64::from(s) / 2.0);
         let (across, down) = (x.cross(axis) * half_px[0], y.cross(axis) * half_px[1]);
-        // The greatest eigenvalue of the rows' products with each other.
+        // The eigenvalues of the rows' products with each other.
         let (aa, bb, ab) = (across.dot(across), down.dot(down), across.dot(down));
-        let greatest = (aa + bb) / 2.0 + ((aa - bb) / 2.0).hypot(ab);
+        let (mean, off) = ((aa + bb) / 2.0, ((aa - bb) / 2.0).hypot(ab));
         let [right, up, middle] = view.rays();
         let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)];
         let lengths = corners.map(|(a, b)| (right * a + up * b + middle).length());
         Self {
-            focal_px: greatest.sqrt(),
+            focal_px: (mean + off).sqrt(),
+            least_focal_px: (mean - off).max(0.0).sqrt(),
             axis,
             kappa: 1.0 / lengths.into_iter().fold(0.0, f64::max),
             near_m: near_of_m(view, grid),
             frustum: Frustum::new(view),
         }
+    }
+
+    /// An angle in radians that no pixel's side exceeds; infinite where pixels have no width.
+    pub(super) fn widest_pixel(&self) -> f64 {
+        1.0 / self.least_focal_px
+    }
+
+    /// All that is seen is drawn from this distance on, in metres from the eye; what is nearer may be cut away.
+    pub(super) fn drawn_from_m(&self) -> f64 {
+        self.near_m / self.kappa
     }
 
     /// The most pixels that a segment spans of which one end is *seen* in the box from `low` to `high` (metres east, up

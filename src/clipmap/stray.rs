@@ -11,11 +11,12 @@
 //! 3. `|covariance| <= v (max d - min d) / 4` (Gruess 1935), with d taken from the windows' samples.
 //! 4. As well, `|D - S0| <= E + sum w alpha_i |d_i| <= E + max alpha_i |d_i|`, and `|D - S0| <= F + max (1 - alpha_i) |d_i|`.
 //!
-//! e is the least of what 2 and 3, and each half of 4, allow.
+//! e is the least of what 2 and 3, and each half of 4, allow, and of what the whole patch does:
 //!
-//! *Before looking at triangles*: as `|d_i| <= E + F` at a corner where S0 exists, 2 and 3 are at most
-//! `max(E, F) + (E + F) / 2`. At a corner beyond the DEM's edge there is no S0, and corners may be void: there d is at most the
-//! range of all heights of both patches and of S0 between them.
+//! *Before looking at triangles*: `|d_i| <= E + F` at a corner where S0 exists, so with the least and the greatest alpha of
+//! the patch 3 is at most `v (E + F) / 2`, and 4 follows as it stands. At a corner beyond the DEM's edge there is no S0, and
+//! corners may be void: there d is at most the range of all heights of both patches and of S0 between them, which is added
+//! to the greater of E and F.
 //!
 //! *Voids.* Where a corner lacks a or b, the vertex function draws the other. Where all corners have their a but not all
 //! their b, one without b counts as alpha 0, and the first half of 4 is left. Where all have their b but not all their a,
@@ -31,8 +32,8 @@ use glam::DVec3;
 use super::Clipmap;
 use super::alpha::{self, MARGIN};
 use super::certificate::Terms;
+use super::scene::{Scene, hull};
 use super::screen::{Screen, Sight};
-use super::selection::{Scene, hull};
 use super::window::PatchInfo;
 use crate::grid::{PATCH, Patch};
 
@@ -63,8 +64,8 @@ enum Lies {
     Own,
     /// The next coarser one, alpha being 1 on all of it.
     Coarser,
-    /// Between the two.
-    Between,
+    /// Between the two, alpha being within these everywhere.
+    Between([f64; 2]),
 }
 
 /// What is known of a patch before its triangles are looked at.
@@ -124,7 +125,7 @@ impl Strays<'_> {
         let [own, parent] = self.infos(patch);
         // Of a wholly void patch only what lies on the parent's surface is drawn.
         let lies = match self.lies(patch) {
-            Lies::Between if own.is_some_and(|p| p.bounds.is_void()) => Lies::Coarser,
+            Lies::Between(_) if own.is_some_and(|p| p.bounds.is_void()) => Lies::Coarser,
             lies => lies,
         };
         let known = self.known(patch, lies, own, parent)?;
@@ -162,11 +163,11 @@ impl Strays<'_> {
             rounding_m: 0.0,
             ragged: false,
         };
-        match lies {
+        let [low, high] = match lies {
             Lies::Own => return own.map(of_one),
             Lies::Coarser => return parent.map(of_one),
-            Lies::Between => {}
-        }
+            Lies::Between(alphas) => alphas,
+        };
         let (own, parent) = (own?, parent?);
         let (e, f) = (error(own), error(parent));
         let heights = hull([Some(own), Some(parent)]);
@@ -175,9 +176,11 @@ impl Strays<'_> {
         let strays = if ragged {
             // `min` and `max` leave out what is not known, a difference with it is NaN and counts as nothing.
             let range = f64::from(heights[1].max(truth[1])) - f64::from(heights[0].min(truth[0]));
-            range.max(0.0)
+            e.max(f) + range.max(0.0)
         } else {
-            (e + f) / 2.0
+            let at = |alpha: f64| e + alpha * (f - e);
+            let blend = at(low).max(at(high)) + (high - low) * (e + f) / 2.0;
+            blend.min(e + high * (e + f)).min(f + (1.0 - low) * (e + f))
         };
         let greatest = [own, parent]
             .into_iter()
@@ -189,7 +192,7 @@ impl Strays<'_> {
             errors: [e, f],
             heights,
             truth: truth.map(f64::from),
-            most_m: e.max(f) + strays + rounding_m,
+            most_m: strays + rounding_m,
             rounding_m,
             ragged,
         })
@@ -232,7 +235,7 @@ impl Strays<'_> {
         match known.lies {
             Lies::Own => return e,
             Lies::Coarser => return f,
-            Lies::Between => {}
+            Lies::Between(_) => {}
         }
         // A step of NaN is that of a corner without one of the two, which `max` and `min` leave out.
         let greatest = |weight: fn(&Corner) -> f64| {
@@ -253,7 +256,7 @@ impl Strays<'_> {
                 strays.fold(0.0, f64::max)
             }
         };
-        strays + known.rounding_m
+        (strays + known.rounding_m).min(known.most_m)
     }
 
     /// What 2 and 3 of the head of this file allow on a triangle that has both surfaces.
@@ -297,7 +300,7 @@ impl Strays<'_> {
         let [low, high] = match lies {
             Lies::Own => [0.0; 2],
             Lies::Coarser => [1.0; 2],
-            Lies::Between => {
+            Lies::Between(_) => {
                 let d = self.scene.distance(patch.level, i, j);
                 let held = alpha::held(
                     self.scene.held,
@@ -359,12 +362,14 @@ impl Strays<'_> {
         let held = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[u, v]: [usize; 2]| {
             alpha::held(self.scene.held, level.parent_last, patch.level, x[u], z[v])
         });
-        if low.max(held.into_iter().fold(1.0, f32::min)) == 1.0 {
+        let low = low.max(held.into_iter().fold(1.0, f32::min));
+        let high = high.max(held.into_iter().fold(0.0, f32::max));
+        if low == 1.0 {
             Lies::Coarser
-        } else if high.max(held.into_iter().fold(0.0, f32::max)) == 0.0 {
+        } else if high == 0.0 {
             Lies::Own
         } else {
-            Lies::Between
+            Lies::Between([low, high].map(f64::from))
         }
     }
 }

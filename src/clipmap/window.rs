@@ -19,6 +19,8 @@ pub struct PatchInfo {
     pub bounds: Bounds,
     /// Whether a resident sample of it is void.
     pub voids: bool,
+    /// Whether one of a finer level over its ground is, or was while the patch was resident.
+    pub voids_below: bool,
 }
 
 /// A texel of the light texture: share of the sun, share of the sky, slope to the east, slope to the south.
@@ -40,6 +42,9 @@ pub struct Window {
     patch_slots: i64,
     patch_resident: Rect,
     patches: Vec<Option<PatchInfo>>,
+    /// Patches of which something was read, until that is handed up.
+    noted: Vec<[i64; 2]>,
+    has_met_voids: bool,
     provisional: bool,
     pub(super) missing: Missing,
 }
@@ -64,6 +69,8 @@ impl Window {
             patch_slots,
             patch_resident: Rect::EMPTY,
             patches: vec![None; (patch_slots * patch_slots) as usize],
+            noted: Vec::new(),
+            has_met_voids: false,
             provisional: false,
             missing: Missing::default(),
         }
@@ -323,13 +330,45 @@ impl Window {
             .cells()
             .any(|(i, j)| self.heights[self.index(i, j)].is_nan());
         let index = self.patch_index(a, b);
+        let voids_below = self.patches[index].is_some_and(|p| p.voids_below);
         let known = self.patches[index].map(|p| p.bounds);
         let bounds = match (known, bounds) {
             // What stood in for these data is still drawn beside them.
             (Some(known), Some(bounds)) if self.provisional => Some(both(&known, &bounds)),
             _ => known.or(bounds),
         };
-        self.patches[index] = bounds.map(|bounds| PatchInfo { bounds, voids });
+        self.patches[index] = bounds.map(|bounds| PatchInfo {
+            bounds,
+            voids,
+            voids_below,
+        });
+        self.has_met_voids |= voids;
+        self.noted.push([a, b]);
+    }
+
+    /// A patch of which something was read since it was last taken here.
+    pub(super) fn take_noted(&mut self) -> Option<[i64; 2]> {
+        self.noted.pop()
+    }
+
+    /// Whether any patch ever had voids.
+    pub(super) fn has_met_voids(&self) -> bool {
+        self.has_met_voids
+    }
+
+    /// Whether the window is for samples of patch (a, b), known or not.
+    pub(super) fn is_for_patch(&self, a: i64, b: i64) -> bool {
+        self.patch_resident.contains(a, b)
+    }
+
+    /// Notes voids of a finer level over the ground of patch (a, b), if that is known.
+    pub(super) fn note_voids_below(&mut self, a: i64, b: i64) {
+        if self.patch_resident.contains(a, b) {
+            let index = self.patch_index(a, b);
+            if let Some(info) = &mut self.patches[index] {
+                info.voids_below = true;
+            }
+        }
     }
 
     /// Notes that samples of `other`, a window over the same ground, will lie beside its own: bounds of both hold.

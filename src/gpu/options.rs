@@ -63,7 +63,8 @@ pub struct RendererOptions {
     /// ```
     ///
     /// Names that the shaders have already are refused like anything else that does not compile. Derivatives are zero or
-    /// meaningless on the few pixels where a seam between levels is closed.
+    /// meaningless on the few pixels where a seam between levels is closed. Where it discards, or what it returns is
+    /// blended, [`crate::clipmap::ClipmapOptions::occlusion`] is to be cleared: else ground behind ground is left out.
     pub surface: Option<String>,
 }
 

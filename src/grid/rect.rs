@@ -1,7 +1,7 @@
 //! Half-open rectangles of samples or patches.
 
 /// Columns `x0..x1` and rows `z0..z1`, in samples of a level (or in patches, where it is said).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Rect {
     /// First column.
     pub x0: i64,

@@ -2,8 +2,12 @@
 
 use crate::grid::Size;
 
-/// Fills the NaN of `values`, a grid of `size` row by row: wave by wave outward from the valid ones, each the
-/// mean of those of its eight neighbours that were known before its wave. Where nothing is known, all become 1.
+/// Waves that go outward: beyond them nothing is looked at, and what lies within as many rows and columns decides what
+/// a sample becomes. What is drawn beside a void asks for two samples of light.
+pub(super) const WAVES: i64 = 16;
+
+/// Fills the NaN of `values`, a grid of `size` row by row: in 16 waves outward from the valid ones, each the mean of those
+/// of its eight neighbours that were known before its wave. What none of them reaches becomes 1.
 pub fn fill_voids(values: &mut [f32], size: Size) {
     let (width, height) = (size.width as usize, size.height as usize);
     let around = |at: usize| {
@@ -11,17 +15,13 @@ pub fn fill_voids(values: &mut [f32], size: Size) {
         let rows = z.saturating_sub(1)..(z + 2).min(height);
         rows.flat_map(move |z| (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| z * width + x))
     };
-    if values.iter().all(|v| v.is_nan()) {
-        values.fill(1.0);
-        return;
-    }
     // A sample is queued when its first neighbour becomes known, so each is filled once.
     let mut queued = vec![false; values.len()];
     let mut wave: Vec<usize> = (0..values.len())
         .filter(|&at| values[at].is_nan() && around(at).any(|n| !values[n].is_nan()))
         .collect();
     wave.iter().for_each(|&at| queued[at] = true);
-    while !wave.is_empty() {
+    for _ in 0..WAVES {
         let means: Vec<f32> = wave
             .iter()
             .map(|&at| {
@@ -45,6 +45,7 @@ pub fn fill_voids(values: &mut [f32], size: Size) {
         }
         wave = next;
     }
+    values.iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = 1.0);
 }
 
 #[cfg(test)]
@@ -65,6 +66,34 @@ mod tests {
         let mut none = [NAN; 6];
         fill_voids(&mut none, Size { width: 2, height: 3 });
         assert_eq!(none, [1.0; 6]);
+        // The waves end.
+        let mut long = [NAN; 40];
+        long[0] = 0.25;
+        fill_voids(&mut long, Size { width: 40, height: 1 });
+        assert!(long[..17].iter().all(|&v| v == 0.25) && long[17..].iter().all(|&v| v == 1.0));
+    }
+
+    #[test]
+    fn rows_depend_on_as_many_beside_them_as_there_are_waves() {
+        let size = Size {
+            width: 29,
+            height: 90,
+        };
+        for (seed, share) in [(1, 0.5), (2, 0.95), (3, 0.995)] {
+            let before = Random::new(seed).heights(size.samples(), 0.0, 1.0, share);
+            let filled = |rows: std::ops::Range<i64>| {
+                let mut part = before[(rows.start * 29) as usize..(rows.end * 29) as usize].to_vec();
+                let height = rows.end - rows.start;
+                fill_voids(&mut part, Size { height, ..size });
+                part
+            };
+            let whole = filled(0..90);
+            let with =
+                |beside: i64| filled(40 - beside..50 + beside)[(beside * 29) as usize..][..290].to_vec();
+            assert_eq!(whole[40 * 29..50 * 29], with(WAVES), "seed {seed}");
+            // A control, where voids are so many that the last wave goes out.
+            assert!(seed < 3 || whole[40 * 29..50 * 29] != with(WAVES / 2));
+        }
     }
 
     #[test]
@@ -75,6 +104,7 @@ mod tests {
         };
         for seed in 0..20 {
             let before = Random::new(seed).heights(size.samples(), 0.25, 0.75, 0.9);
+            // So many that no sample is farther from all of them than the waves go.
             let mut after = before.clone();
             fill_voids(&mut after, size);
             assert!(after.iter().all(|v| (0.25..=0.75).contains(v)), "seed {seed}");

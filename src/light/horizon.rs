@@ -1,21 +1,20 @@
 //! How high the terrain stands in one direction, exactly, over the triangulated surface of level 0.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
+use super::crests::Crests;
 use super::earth::Earth;
 use super::rays::Rays;
-use super::relief::{LANES, Relief};
-use super::{BAND, check, misuse};
+use super::relief::{BLOCK, Relief, Scratch, Whole};
+use super::{check, misuse};
 use crate::error::{Error, Result};
-use crate::grid::Grid;
+use crate::grid::{Grid, Rect};
 use crate::progress::Progress;
 use crate::work::{Work, each_chunk};
 
 #[cfg(test)]
 mod tests;
-
-/// Columns that are traced over all rows of a band before the next: what their rays read stays in the cache.
-const TILE: usize = 256;
 
 /// The tangent of the elevation of the horizon at `azimuth_deg` (clockwise from north), for every sample; at
 /// least 0, as a plain that goes on beyond the DEM would show it; NaN at voids.
@@ -53,56 +52,77 @@ pub fn horizon_tangents_on(
         )));
     }
     progress.begin("horizon", grid.size.height as u64);
-    let relief = Relief::new(heights, grid, work);
+    let whole = Whole::of(heights, grid);
+    let relief = Relief::new(grid, &whole, Crests::of(heights, grid, work));
     let rays = Rays::new(grid, earth.on_grid_deg(azimuth_deg), earth.radius_m, 0.0);
-    let mut tangents = vec![0.0; heights.len()];
-    each_lanes(
-        &mut tangents,
-        grid,
-        "horizon",
-        work,
-        progress,
-        |[i, j], tangents| {
-            relief.raise(&rays, [i, j], f32::INFINITY, tangents);
-            let here = &heights[j * grid.size.width as usize + i..];
-            for (tangent, h) in tangents.iter_mut().zip(here) {
-                *tangent = if h.is_nan() { f32::NAN } else { *tangent };
+    all_rows(grid, "horizon", progress, |rows, tangents| {
+        each_block(&relief, rows, tangents, work, |block, scratch, tangents| {
+            relief.settle(block, scratch)?;
+            relief.raise(&rays, block, f32::INFINITY, tangents, scratch)?;
+            for tangent in tangents {
+                // No ground stands at a right angle: it is a void that does.
+                *tangent = if *tangent == f32::INFINITY {
+                    f32::NAN
+                } else {
+                    *tangent
+                };
             }
-        },
-    )?;
-    Ok(tangents)
+            Ok(())
+        })
+    })
 }
 
-/// Runs `task` on the values of [`LANES`] samples in a row, or where fewer are left on each alone, with column and
-/// row of the first, over bands of rows; progress advances by rows. `subject` is what is cancelled.
-pub(super) fn each_lanes(
-    values: &mut [f32],
+/// One value a sample of all of `grid`, of which `make` gives so many rows as blocks are high at once; progress advances
+/// by rows. `subject` is what is cancelled.
+pub(super) fn all_rows(
     grid: &Grid,
     subject: &str,
-    work: &dyn Work,
     progress: &dyn Progress,
-    task: impl Fn([usize; 2], &mut [f32]) + Sync,
-) -> Result<()> {
+    mut make: impl FnMut(Range<i64>, &mut [f32]) -> Result<()>,
+) -> Result<Vec<f32>> {
     let width = grid.size.width as usize;
-    let cancelled = AtomicBool::new(false);
-    each_chunk(work, values, BAND * width, |band, values| {
-        if cancelled.load(Ordering::Relaxed) || progress.cancelled() {
-            cancelled.store(true, Ordering::Relaxed);
-            return;
+    let mut values = vec![0.0; grid.size.samples() as usize];
+    for (rows, z0) in values.chunks_mut(BLOCK[1] * width).zip((0..).step_by(BLOCK[1])) {
+        if progress.cancelled() {
+            return Err(Error::cancelled(subject));
         }
-        for first in (0..width).step_by(TILE) {
-            let end = (first + TILE).min(width);
-            for (j, row) in (band * BAND..).zip(values.chunks_mut(width)) {
-                for (i, lanes) in (first..).step_by(LANES).zip(row[first..end].chunks_mut(LANES)) {
-                    task([i, j], lanes);
-                }
-            }
-        }
-        progress.advance((values.len() / width) as u64);
-    });
-    if cancelled.into_inner() {
-        Err(Error::cancelled(subject))
-    } else {
-        Ok(())
+        let count = (rows.len() / width) as i64;
+        make(z0..z0 + count, rows)?;
+        progress.advance(count as u64);
     }
+    Ok(values)
+}
+
+/// Has `task` make the values of every block of `rows`, at most as many as blocks are high and beginning with one. It is
+/// given zeros in rows of [`BLOCK`]`[0]`, of which those within the block are put into `out`, row by row.
+pub(super) fn each_block(
+    relief: &Relief<'_>,
+    rows: Range<i64>,
+    out: &mut [f32],
+    work: &dyn Work,
+    task: impl Fn(Rect, &mut Scratch, &mut [f32]) -> Result<()> + Sync,
+) -> Result<()> {
+    debug_assert!(rows.start % BLOCK[1] as i64 == 0 && rows.end - rows.start <= BLOCK[1] as i64);
+    let width = relief.grid().size.width;
+    let area = BLOCK[0] * (rows.end - rows.start) as usize;
+    let mut blocks = vec![0.0; (width as usize).div_ceil(BLOCK[0]) * area];
+    let failed = Mutex::new(None);
+    each_chunk(work, &mut blocks, area, |x, values| {
+        let x0 = (x * BLOCK[0]) as i64;
+        let block = Rect::new(x0, rows.start, (x0 + BLOCK[0] as i64).min(width), rows.end);
+        let mut scratch = relief.scratch();
+        if let Err(error) = task(block, &mut scratch, values) {
+            *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+        }
+        relief.give_back(scratch);
+    });
+    if let Some(error) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        return Err(error);
+    }
+    for (z, row) in out.chunks_mut(width as usize).enumerate() {
+        for (block, part) in blocks.chunks(area).zip(row.chunks_mut(BLOCK[0])) {
+            part.copy_from_slice(&block[z * BLOCK[0]..][..part.len()]);
+        }
+    }
+    Ok(())
 }

@@ -1,14 +1,12 @@
 //! Light on the terrain: the sun's share and the sky's share of every sample, traced over the DEM's surface.
 //!
-//! `rays` and `relief` find how high the terrain stands in a direction, `sun` and `sky` make light of it, `fill`
-//! spreads it under voids, and [`light_levels`] filters it into levels like the heights. All of it is traced
+//! `rays`, `crests` and `relief` find how high the terrain stands in a direction, `sun` and `sky` make light of it, [`light_levels`]
+//! and, row by row, [`LightLevels`] filter it into levels like the heights, and `fill` spreads each under its voids. All of it is traced
 //! over `S0`, level 0; no data, and what lies beyond the DEM, neither casts a shadow nor blocks the sky.
 //!
 //! Azimuths are degrees clockwise from true north; [`Earth`] says where the grid's north is, and how the ground curves.
 //! [`Sun::at`] is the sun of a time and place. Heights are metres less [`Grid::base_m`], row by row, finite or NaN for no
 //! data.
-
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use half::f16;
 
@@ -17,11 +15,13 @@ use crate::grid::{Grid, Size};
 use crate::levels::LightSample;
 use crate::progress::Progress;
 use crate::pyramid::{Filter, downsample};
-use crate::work::{Work, each_chunk};
+use crate::work::Work;
 
+mod crests;
 mod earth;
 mod fill;
 mod horizon;
+mod levels;
 mod normal;
 mod rays;
 mod relief;
@@ -29,21 +29,21 @@ mod sky;
 mod sun;
 mod sun_at;
 
+pub use crests::{CREST, Crests};
 pub use earth::{DEFAULT_REFRACTION, Earth, middle};
 pub use fill::fill_voids;
 pub use horizon::{horizon_tangents, horizon_tangents_on};
-pub use sky::{sky_share, sky_share_on};
-pub use sun::{DISC_DEG, Sun, disc_share, sun_share, sun_share_on};
+pub use levels::{LIGHT_ROWS_BESIDE, LightLevels};
+pub use relief::{Ground, Relief};
+pub use sky::{Skylight, sky_share, sky_share_on};
+pub use sun::{DISC_DEG, Sun, Sunlight, disc_share, sun_share, sun_share_on};
 pub use sun_at::Moment;
 
 /// Sky directions unless others are asked for.
 pub const DEFAULT_SKY_DIRECTIONS: u32 = 16;
 
-/// Rows in a band: the unit of work.
-const BAND: usize = 16;
-
-/// Samples that are rounded at once.
-const CHUNK: usize = 1 << 16;
+/// Rows that are traced together.
+pub const ROWS: usize = relief::BLOCK[1];
 
 /// What light is traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,9 +95,9 @@ pub fn trace_light(
     light_levels(grid, heights, sun, sky, filter, work, progress)
 }
 
-/// The light of all of [`Grid::file_levels`] from that of level 0: under voids it is filled outward from valid
-/// neighbours, then filtered like heights in f32 and clamped to 0 to 1 on each level; only what is returned
-/// is rounded to f16.
+/// The light of all of [`Grid::file_levels`] from that of level 0, `heights` saying where that is void: filtered like
+/// heights in f32 and clamped to 0 to 1 on each level, voids left out as they are there; only what is returned is rounded
+/// to f16, and filled outward from valid samples under the voids. See [`LightLevels`], which makes the same row by row.
 ///
 /// # Errors
 /// [`ErrorKind::Misuse`] where the grid is impossible or a length is not the grid's; [`ErrorKind::Cancelled`].
@@ -118,47 +118,28 @@ pub fn light_levels(
         "light levels",
         (1..count).map(|l| 2 * grid.level(l).samples() as u64).sum(),
     );
-    let filled = |mut share: Vec<f32>| {
-        let voids = AtomicBool::new(false);
-        each_chunk(work, &mut share, CHUNK, |chunk, share| {
-            let mut any = false;
-            for (s, h) in share.iter_mut().zip(&heights[chunk * CHUNK..]) {
-                *s = if h.is_nan() { f32::NAN } else { s.clamp(0.0, 1.0) };
-                any |= s.is_nan();
-            }
-            voids.fetch_or(any, Ordering::Relaxed);
+    let mut levels: Vec<Vec<LightSample>> = (0..count)
+        .map(|l| vec![LightSample::default(); grid.level(l).samples() as usize])
+        .collect();
+    let fields: [fn(&mut LightSample) -> &mut f16; 2] = [|l| &mut l.sun, |l| &mut l.sky];
+    for (mut share, field) in [sun, sky].into_iter().zip(fields) {
+        share.iter_mut().zip(heights).for_each(|(s, h)| {
+            *s = if h.is_nan() { f32::NAN } else { s.clamp(0.0, 1.0) };
         });
-        if voids.into_inner() {
-            fill_voids(&mut share, grid.size);
-        }
-        share
-    };
-    let (mut sun, mut sky) = (filled(sun), filled(sky));
-    let mut levels = Vec::with_capacity(count as usize);
-    for l in 0..count {
-        if l > 0 {
-            for share in [&mut sun, &mut sky] {
-                // A share that is whole everywhere stays so, as every kernel's taps sum to 1.
-                if share.iter().all(|&s| s == 1.0) {
-                    share.truncate(grid.level(l).samples() as usize);
-                    progress.advance(grid.level(l).samples() as u64);
-                    continue;
-                }
-                *share = downsample(share, grid.level(l - 1), filter, None, work, progress)?;
+        for (l, samples) in (0..count).zip(&mut levels) {
+            if l > 0 {
+                share = downsample(&share, grid.level(l - 1), filter, None, work, progress)?;
                 share.iter_mut().for_each(|s| *s = s.clamp(0.0, 1.0));
             }
-        }
-        let mut level = vec![LightSample::default(); sun.len()];
-        each_chunk(work, &mut level, CHUNK, |chunk, samples| {
-            let shares = sun[chunk * CHUNK..].iter().zip(&sky[chunk * CHUNK..]);
-            for (sample, (&sun, &sky)) in samples.iter_mut().zip(shares) {
-                *sample = LightSample {
-                    sun: f16::from_f32(sun),
-                    sky: f16::from_f32(sky),
-                };
+            // As a file has them.
+            let mut stored: Vec<f32> = share.iter().map(|&s| f16::from_f32(s).to_f32()).collect();
+            if stored.iter().any(|s| s.is_nan()) {
+                fill_voids(&mut stored, grid.level(l));
             }
-        });
-        levels.push(level);
+            for (sample, &s) in samples.iter_mut().zip(&stored) {
+                *field(sample) = f16::from_f32(s);
+            }
+        }
     }
     Ok(levels)
 }

@@ -1,51 +1,48 @@
 //! The surface normal at samples, by central differences.
 
 use super::relief::LANES;
-use crate::grid::Grid;
 
 /// Slopes of the ground at samples.
 pub(super) struct Slopes<'a> {
+    /// Rows of heights with one sample more on every side of those that are asked for; NaN where there is none.
     heights: &'a [f32],
-    grid: &'a Grid,
+    stride: usize,
     /// One over twice the spacing.
     per_two_m: [f32; 2],
 }
 
 impl<'a> Slopes<'a> {
-    /// The slopes of `heights`, as many as `grid` has samples.
-    pub(super) fn new(heights: &'a [f32], grid: &'a Grid) -> Self {
+    /// The slopes of `heights`, whose rows are `stride` samples apart and begin one sample west and one north of the
+    /// first that is asked for.
+    pub(super) fn new(heights: &'a [f32], stride: usize, spacing_m: [f64; 2]) -> Self {
         Self {
             heights,
-            grid,
-            per_two_m: grid.spacing_m.map(|m| (0.5 / m) as f32),
+            stride,
+            per_two_m: spacing_m.map(|m| (0.5 / m) as f32),
         }
     }
 
-    /// By how much the ground rises a metre eastward and southward at each of `count`, at most [`LANES`], samples from
-    /// (i, j) eastward: central differences, one-sided at the DEM's edges and beside voids, level along an axis without
-    /// a valid neighbour. NaN at voids; 0 beyond `count`.
-    pub(super) fn rises(&self, [i, j]: [usize; 2], count: usize) -> [[f32; LANES]; 2] {
-        let (width, height) = (self.grid.size.width as usize, self.grid.size.height as usize);
-        let at = j * width + i;
+    /// By how much the ground rises a metre eastward and southward at each of [`LANES`] samples from (x, z) eastward:
+    /// central differences, one-sided at the DEM's edges and beside voids, level along an axis without a valid neighbour.
+    /// NaN at voids.
+    pub(super) fn rises(&self, [x, z]: [usize; 2]) -> [[f32; LANES]; 2] {
+        let at = (z + 1) * self.stride + x + 1;
+        let lanes = |at: usize| -> &[f32; LANES] {
+            self.heights[at..at + LANES]
+                .try_into()
+                .expect("the range is as long")
+        };
+        let (here, west, east_of) = (lanes(at), lanes(at - 1), lanes(at + 1));
+        let (north, south_of) = (lanes(at - self.stride), lanes(at + self.stride));
         let [mut east, mut south] = [[0.0; LANES]; 2];
-        let mut whole = count == LANES && i > 0 && i + LANES < width && j > 0 && j + 1 < height;
-        if whole {
-            let lanes = |at: usize| -> &[f32; LANES] {
-                self.heights[at..at + LANES]
-                    .try_into()
-                    .expect("the range is as long")
-            };
-            let (here, west, east_of) = (lanes(at), lanes(at - 1), lanes(at + 1));
-            let (north, south_of) = (lanes(at - width), lanes(at + width));
-            for l in 0..LANES {
-                east[l] = (east_of[l] - west[l]) * self.per_two_m[0];
-                south[l] = (south_of[l] - north[l]) * self.per_two_m[1];
-            }
-            whole = (0..LANES).fold(true, |all, l| all & !(here[l] + east[l] + south[l]).is_nan());
+        for l in 0..LANES {
+            east[l] = (east_of[l] - west[l]) * self.per_two_m[0];
+            south[l] = (south_of[l] - north[l]) * self.per_two_m[1];
         }
+        let whole = (0..LANES).fold(true, |all, l| all & !(here[l] + east[l] + south[l]).is_nan());
         if !whole {
-            for l in 0..count {
-                [east[l], south[l]] = self.beside_gaps([i + l, j]);
+            for l in 0..LANES {
+                [east[l], south[l]] = self.beside_gaps(at + l);
             }
         }
         [east, south]
@@ -53,42 +50,32 @@ impl<'a> Slopes<'a> {
 
     /// Rises eastward and southward where neighbours may be missing.
     #[cold]
-    fn beside_gaps(&self, [i, j]: [usize; 2]) -> [f32; 2] {
-        let (width, height) = (self.grid.size.width as usize, self.grid.size.height as usize);
-        let at = j * width + i;
+    fn beside_gaps(&self, at: usize) -> [f32; 2] {
         let centre = self.heights[at];
         if centre.is_nan() {
             return [f32::NAN; 2];
         }
-        let known = |inside: bool, at: usize| {
-            let h = if inside { self.heights[at] } else { f32::NAN };
-            (!h.is_nan()).then_some(h)
-        };
-        let slope = |before: Option<f32>, after: Option<f32>, per_two_m: f32| match (before, after) {
-            (Some(b), Some(a)) => (a - b) * per_two_m,
-            (None, Some(a)) => (a - centre) * 2.0 * per_two_m,
-            (Some(b), None) => (centre - b) * 2.0 * per_two_m,
-            (None, None) => 0.0,
+        let slope = |before: f32, after: f32, per_two_m: f32| match (before.is_nan(), after.is_nan()) {
+            (false, false) => (after - before) * per_two_m,
+            (true, false) => (after - centre) * 2.0 * per_two_m,
+            (false, true) => (centre - before) * 2.0 * per_two_m,
+            (true, true) => 0.0,
         };
         let [columns, rows] = self.per_two_m;
         [
+            slope(self.heights[at - 1], self.heights[at + 1], columns),
             slope(
-                known(i > 0, at.wrapping_sub(1)),
-                known(i + 1 < width, at + 1),
-                columns,
-            ),
-            slope(
-                known(j > 0, at.wrapping_sub(width)),
-                known(j + 1 < height, at + width),
+                self.heights[at - self.stride],
+                self.heights[at + self.stride],
                 rows,
             ),
         ]
     }
 
-    /// The cosines between `direction`, a unit vector of the world (x east, y up, z south), and the normals at `count`
-    /// samples from (i, j) eastward; NaN at voids.
-    pub(super) fn cosines(&self, at: [usize; 2], count: usize, direction: [f32; 3]) -> [f32; LANES] {
-        let [east, south] = self.rises(at, count);
+    /// The cosines between `direction`, a unit vector of the world (x east, y up, z south), and the normals at
+    /// [`LANES`] samples from (x, z) eastward; NaN at voids.
+    pub(super) fn cosines(&self, at: [usize; 2], direction: [f32; 3]) -> [f32; LANES] {
+        let [east, south] = self.rises(at);
         std::array::from_fn(|l| {
             let (e, s) = (east[l], south[l]);
             (direction[1] - e * direction[0] - s * direction[2]) / (1.0 + e * e + s * s).sqrt()
@@ -99,9 +86,22 @@ impl<'a> Slopes<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::Grid;
+
+    /// `heights` with a sample of no data around, and so many at the ends of rows that all lanes are there.
+    fn padded(heights: &[f32], grid: &Grid) -> (Vec<f32>, usize) {
+        let width = grid.size.width as usize;
+        let stride = width + 2 + LANES;
+        let mut padded = vec![f32::NAN; (heights.len() / width + 2) * stride];
+        for (z, row) in heights.chunks(width).enumerate() {
+            padded[(z + 1) * stride + 1..][..width].copy_from_slice(row);
+        }
+        (padded, stride)
+    }
 
     fn rise(heights: &[f32], grid: &Grid, i: usize, j: usize) -> [f32; 2] {
-        let [east, south] = Slopes::new(heights, grid).rises([i, j], 1);
+        let (padded, stride) = padded(heights, grid);
+        let [east, south] = Slopes::new(&padded, stride, grid.spacing_m).rises([i, j]);
         [east[0], south[0]]
     }
 
@@ -132,10 +132,11 @@ mod tests {
         let grid = Grid::new(30, 7, [3.0, 5.0]);
         let mut heights = crate::pyramid::random::Random::new(3).heights(210, -90.0, 90.0, 0.2);
         heights[3 * 30 + 11] = 5.0;
-        let slopes = Slopes::new(&heights, &grid);
+        let (padded, stride) = padded(&heights, &grid);
+        let slopes = Slopes::new(&padded, stride, grid.spacing_m);
         for (i, j) in (0..30 - LANES).flat_map(|i| (0..7).map(move |j| (i, j))) {
-            let [east, south] = slopes.rises([i, j], LANES);
-            let cosines = slopes.cosines([i, j], LANES, [0.6, 0.0, 0.8]);
+            let [east, south] = slopes.rises([i, j]);
+            let cosines = slopes.cosines([i, j], [0.6, 0.0, 0.8]);
             for l in 0..LANES {
                 let [e, s] = rise(&heights, &grid, i + l, j);
                 assert_eq!([e, s].map(f32::to_bits), [east[l], south[l]].map(f32::to_bits));

@@ -2,15 +2,25 @@
 //!
 //! Along a ray from a sample the surface is linear between its crossings with columns, rows and the diagonals from
 //! north-west to south-east. So a grid has one list of crossings for an azimuth: two ends, the share of the way
-//! between them, the distance. Consecutive crossings are joined into runs of few cells, those into longer ones: a
-//! tree, laid out so that a walk over it goes forward only.
+//! between them, the distance. They come in stages of as many cells along the axis that the ray runs along; within a
+//! stage consecutive crossings are joined into runs of few cells, those into longer ones: a tree, laid out so that a walk
+//! over it goes forward only.
 //!
 //! On an earth of radius R the ground at distance t lies lower by `t^2 / 2R`, and the tangent by `t / 2R`.
 
 use crate::grid::{Grid, MAX_SIZE, Rect};
 
+/// Cells of a stage along the axis that the ray runs along.
+pub(super) const STAGE: i64 = 256;
+
 /// Cells that a run spans at most, longest runs first.
-pub(super) const SPANS: [i64; 4] = [256, 64, 16, 4];
+pub(super) const SPANS: [i64; 3] = [64, 16, 4];
+
+/// Stages that are kept; those farther out are made anew by whoever needs them.
+const KEPT: i64 = 4;
+
+/// The row stride of what the ends of crossings are offsets in: a stage as all samples of a block see it fits.
+pub(super) const STRIDE: usize = 544;
 
 /// The part of a cell that counts as no part: a crossing this near to a sample passes through it.
 const SNAP: f64 = 1e-9;
@@ -38,24 +48,39 @@ pub(super) fn direction(azimuth_deg: f64) -> [f64; 2] {
     [east, -north]
 }
 
-/// The crossings of one azimuth, outward.
+/// The rays of one azimuth.
 pub(super) struct Rays {
+    /// Columns, rows and diagonals crossed a metre, negative where their numbers fall.
+    rates: [f64; 3],
+    /// The axis along which it crosses more of columns and rows: 0 or 1.
+    along: usize,
+    radius_m: f64,
+    slack: f32,
+    /// Stages until the DEM ends for every sample.
+    stages: i64,
+    kept: Vec<Stage>,
+}
+
+/// The crossings of a stage.
+#[derive(Default)]
+pub(super) struct Stage {
     pub(super) crossings: Vec<Crossing>,
     /// Runs, each before those it is made of.
     pub(super) runs: Vec<Run>,
-    /// The number of leading crossings that stay on the grid, by the cells from the sample to its edge.
-    on_grid: [Vec<u32>; 2],
-    /// The last column and row.
-    last: [i64; 2],
-    /// Whether the rays run towards the last column, and the last row.
-    forward: [bool; 2],
+    /// The samples at the ends of its crossings, relative to the rays' own.
+    pub(super) hull: Rect,
+    /// As of a run that holds them all.
+    pub(super) per_m: f32,
+    pub(super) drop: f32,
+    /// While it is made: the samples at the ends of each crossing.
+    boxes: Vec<Rect>,
 }
 
 /// A crossing: height = that of end `a` + `weight` (that of end `b` - that of end `a`).
 pub(super) struct Crossing {
-    /// The ends, as offsets in the array of samples.
-    pub(super) a: isize,
-    pub(super) b: isize,
+    /// The ends, as offsets among samples whose rows are [`STRIDE`] apart.
+    pub(super) a: i32,
+    pub(super) b: i32,
     pub(super) weight: f32,
     /// One over the distance in metres.
     pub(super) per_m: f32,
@@ -71,8 +96,8 @@ pub(super) struct Run {
     pub(super) end: u32,
     /// The run that follows where this one is left out.
     pub(super) next: u32,
-    /// That corner, relative to the sample.
-    pub(super) corner: [i32; 2],
+    /// That corner, relative to the north-western one of the stage.
+    pub(super) corner: [u16; 2],
     /// One over the distance of its first crossing, in metres.
     pub(super) per_m: f32,
     /// By how much the earth's curve lowers its tangents at least, and the gain that is not sought.
@@ -84,22 +109,65 @@ impl Rays {
     /// raise a tangent by no more than `slack` may be left out.
     pub(super) fn new(grid: &Grid, azimuth_deg: f64, radius_m: f64, slack: f64) -> Self {
         let [east, south] = direction(azimuth_deg);
-        // Cells a metre.
         let (gx, gz) = (east / grid.spacing_m[0], south / grid.spacing_m[1]);
-        let rates = [gx, gz, gx - gz]; // of crossing columns, rows, diagonals
-        let last = [grid.size.width - 1, grid.size.height - 1];
-        let mut next = [1i64; 3];
-        let mut crossings = Vec::new();
-        let mut boxes = Vec::new();
-        // The greatest distance in cells from the sample to an end of any crossing so far.
-        let mut reach = [0i64; 2];
-        let mut reaches = [Vec::new(), Vec::new()];
+        let along = usize::from(gz.abs() > gx.abs());
+        let longest = [grid.size.width, grid.size.height][along] - 1;
+        let mut rays = Self {
+            rates: [gx, gz, gx - gz],
+            along,
+            radius_m,
+            slack: slack as f32,
+            stages: (longest + STAGE - 1) / STAGE,
+            kept: Vec::new(),
+        };
+        for k in 0..rays.stages.min(KEPT) {
+            let mut stage = Stage::default();
+            rays.cross(k, &mut stage);
+            stage.boxes = Vec::new();
+            rays.kept.push(stage);
+        }
+        rays
+    }
+
+    /// Stage `k`, counted outward from 0, perhaps made in `room`; none where no ray of the DEM has one.
+    pub(super) fn stage<'a>(&'a self, k: i64, room: &'a mut Stage) -> Option<&'a Stage> {
+        if k >= self.stages {
+            return None;
+        }
+        if let Some(kept) = self.kept.get(k as usize) {
+            return Some(kept);
+        }
+        self.cross(k, room);
+        Some(room)
+    }
+
+    /// Puts the crossings of stage `k` into `stage`.
+    fn cross(&self, k: i64, stage: &mut Stage) {
+        let [gx, gz, _] = self.rates;
+        // Every stage begins with the line after the one that ended the stage before, whatever rounding does.
+        let passed = |k: i64| {
+            self.rates
+                .map(|rate| ((k * STAGE) as f64 * (rate / self.rates[self.along]).abs()).floor() as i64)
+        };
+        let (mut next, last) = (passed(k).map(|n| n + 1), passed(k + 1));
+        stage.crossings.clear();
+        stage.boxes.clear();
+        stage.runs.clear();
         let mut last_sample = None;
         loop {
-            let distance = |kind: usize| next[kind] as f64 / rates[kind].abs(); // infinite where never crossed
+            let distance = |kind: usize| {
+                if next[kind] > last[kind] {
+                    f64::INFINITY
+                } else {
+                    next[kind] as f64 / self.rates[kind].abs()
+                }
+            };
             let kind = (0..3).fold(0, |best, k| if distance(k) < distance(best) { k } else { best });
             let t = distance(kind);
-            let line = if rates[kind] < 0.0 {
+            if t == f64::INFINITY {
+                break;
+            }
+            let line = if self.rates[kind] < 0.0 {
                 -next[kind]
             } else {
                 next[kind]
@@ -115,68 +183,54 @@ impl Rays {
                 // On a diagonal, column less row is its number.
                 _ => ([at, at - line], [at + on, at - line + on]),
             };
-            for axis in 0..2 {
-                reach[axis] = reach[axis].max(a[axis].abs()).max(b[axis].abs());
-            }
-            if reach[0] > last[0] || reach[1] > last[1] {
-                break;
-            }
             // Three lines meet in a sample.
             if weight == 0.0 && last_sample == Some(a) {
                 continue;
             }
             last_sample = (weight == 0.0).then_some(a);
-            let offset = |end: [i64; 2]| (end[1] * grid.size.width + end[0]) as isize;
-            crossings.push(Crossing {
-                a: offset(a),
-                b: offset(b),
+            stage.crossings.push(Crossing {
+                a: 0,
+                b: 0,
                 weight: weight as f32,
                 per_m: (1.0 / t) as f32,
-                drop: (0.5 * t / radius_m) as f32,
+                drop: (0.5 * t / self.radius_m) as f32,
             });
-            boxes.push(Rect::new(
-                a[0].min(b[0]),
-                a[1].min(b[1]),
-                a[0].max(b[0]) + 1,
-                a[1].max(b[1]) + 1,
-            ));
-            reaches[0].push(reach[0]);
-            reaches[1].push(reach[1]);
+            stage.boxes.push(Rect::new(a[0], a[1], b[0] + 1, b[1] + 1));
         }
-        let on_grid = [0, 1].map(|axis: usize| {
-            (0..=last[axis])
-                .map(|cells| reaches[axis].partition_point(|&r| r <= cells) as u32)
-                .collect()
-        });
-        let mut tree = Tree {
-            crossings: &crossings,
-            boxes: &boxes,
-            slack: slack as f32,
-            runs: Vec::new(),
-        };
-        tree.join(0, 0, boxes.len());
-        let runs = tree.runs;
-        Self {
-            crossings,
-            runs,
-            on_grid,
-            last,
-            forward: [gx > 0.0, gz > 0.0],
-        }
+        stage.finish(self.slack);
     }
+}
 
-    /// The number of leading crossings that stay on the grid for each of `lanes` samples from (i, j) eastward.
-    pub(super) fn on_grid(&self, i: usize, j: usize, lanes: usize) -> usize {
-        let cells = |axis: usize, least: usize, most: usize| {
-            if self.forward[axis] {
-                self.last[axis] as usize - most
-            } else {
-                least
-            }
+impl Stage {
+    /// Joins its crossings, whose ends are those of `boxes`, into runs.
+    fn finish(&mut self, slack: f32) {
+        let Some(first) = self.crossings.first() else {
+            self.hull = Rect::EMPTY;
+            return;
         };
-        let columns = self.on_grid[0][cells(0, i, i + lanes - 1)];
-        columns.min(self.on_grid[1][cells(1, j, j)]) as usize
+        (self.per_m, self.drop) = (first.per_m, first.drop + slack);
+        self.hull = self
+            .boxes
+            .iter()
+            .fold(self.boxes[0], |hull, ends| joined(hull, *ends));
+        for (crossing, ends) in self.crossings.iter_mut().zip(&self.boxes) {
+            let offset = |x: i64, z: i64| ((z - self.hull.z0) * STRIDE as i64 + x - self.hull.x0) as i32;
+            crossing.a = offset(ends.x0, ends.z0);
+            crossing.b = offset(ends.x1 - 1, ends.z1 - 1);
+        }
+        let mut tree = Tree {
+            crossings: &self.crossings,
+            boxes: &self.boxes,
+            origin: [self.hull.x0, self.hull.z0],
+            slack,
+            runs: &mut self.runs,
+        };
+        tree.join(0, 0, self.boxes.len());
     }
+}
+
+fn joined(a: Rect, b: Rect) -> Rect {
+    Rect::new(a.x0.min(b.x0), a.z0.min(b.z0), a.x1.max(b.x1), a.z1.max(b.z1))
 }
 
 /// Position `p`, in cells, as a sample and the share of the way to the next; none where there is no such sample.
@@ -196,8 +250,9 @@ struct Tree<'a> {
     crossings: &'a [Crossing],
     /// The samples at the ends of each crossing.
     boxes: &'a [Rect],
+    origin: [i64; 2],
     slack: f32,
-    runs: Vec<Run>,
+    runs: &'a mut Vec<Run>,
 }
 
 impl Tree<'_> {
@@ -208,13 +263,7 @@ impl Tree<'_> {
             let mut hull = self.boxes[from];
             let mut to = from + 1;
             while to < end {
-                let ends = &self.boxes[to];
-                let joined = Rect::new(
-                    hull.x0.min(ends.x0),
-                    hull.z0.min(ends.z0),
-                    hull.x1.max(ends.x1),
-                    hull.z1.max(ends.z1),
-                );
+                let joined = joined(hull, self.boxes[to]);
                 if joined.width() > SPANS[depth] + 1 || joined.height() > SPANS[depth] + 1 {
                     break;
                 }
@@ -227,7 +276,10 @@ impl Tree<'_> {
                 first: from as u32,
                 end: to as u32,
                 next: 0,
-                corner: [hull.x0 as i32, hull.z0 as i32],
+                corner: [
+                    (hull.x0 - self.origin[0]) as u16,
+                    (hull.z0 - self.origin[1]) as u16,
+                ],
                 per_m: self.crossings[from].per_m,
                 drop: self.crossings[from].drop + self.slack,
             });

@@ -1,11 +1,13 @@
 //! The sky's share: how much of the sky dome a sample sees, weighted by the cosine to its normal.
 
+use std::ops::Range;
+
 use super::check;
+use super::crests::Crests;
 use super::earth::Earth;
-use super::horizon::each_lanes;
-use super::normal::Slopes;
+use super::horizon::{all_rows, each_block};
 use super::rays::{Rays, direction};
-use super::relief::{LANES, Relief};
+use super::relief::{LANES, Relief, Whole, place};
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::progress::Progress;
@@ -59,45 +61,93 @@ pub fn sky_share_on(
     progress: &dyn Progress,
 ) -> Result<Vec<f32>> {
     check(grid, heights.len())?;
-    progress.begin("sky", u64::from(directions) * grid.size.height as u64);
+    progress.begin("sky", grid.size.height as u64);
     if directions == 0 {
         return Ok(vec![1.0; heights.len()]);
     }
-    let relief = Relief::new(heights, grid, work);
-    let slopes = Slopes::new(heights, grid);
-    let mut shares = vec![0.0; heights.len()];
-    for k in 0..directions {
-        let azimuth_deg = f64::from(k) * 360.0 / f64::from(directions);
-        let rays = Rays::new(grid, azimuth_deg, earth.radius_m, SLACK);
-        let [east, south] = direction(azimuth_deg).map(|c| c as f32);
-        each_lanes(&mut shares, grid, "sky", work, progress, |[i, j], sums| {
-            let count = sums.len();
-            let [e, s] = slopes.rises([i, j], count);
-            let (mut up, mut lean) = ([0.0; LANES], [0.0; LANES]);
-            let mut tangents = [0.0; LANES];
-            for l in 0..LANES {
-                // cos S, and sin S cos(phi - A), as the normal leans down the slope.
-                up[l] = 1.0 / (1.0 + e[l] * e[l] + s[l] * s[l]).sqrt();
-                let rise = e[l] * east + s[l] * south;
-                lean[l] = -rise * up[l];
-                tangents[l] = rise.max(0.0); // 0 at voids too
-            }
-            relief.raise(&rays, [i, j], f32::INFINITY, &mut tangents[..count]);
-            let mut terms = [0.0; LANES];
-            for l in 0..LANES {
-                let tangent = tangents[l].min(1e9);
-                let sin_h_squared = 1.0 / (1.0 + tangent * tangent);
-                let h = arc_cotangent(tangent);
-                terms[l] = up[l] * sin_h_squared + lean[l] * (h - tangent * sin_h_squared);
-            }
-            sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-        })?;
+    let light = Skylight::new(grid, earth, directions);
+    let whole = Whole::of(heights, grid);
+    let relief = Relief::new(grid, &whole, Crests::of(heights, grid, work));
+    all_rows(grid, "sky", progress, |rows, out| {
+        light.rows(&relief, rows, out, work)
+    })
+}
+
+/// The light of the sky over a grid.
+pub struct Skylight {
+    /// East and south of each direction, and its rays.
+    directions: Vec<([f32; 2], Rays)>,
+}
+
+impl Skylight {
+    /// That from `directions` azimuths, at least 1, over `grid` on `earth`.
+    pub fn new(grid: &Grid, earth: &Earth, directions: u32) -> Self {
+        let rays = |k: u32| {
+            let azimuth_deg = f64::from(k) * 360.0 / f64::from(directions);
+            let towards = direction(azimuth_deg).map(|c| c as f32);
+            (towards, Rays::new(grid, azimuth_deg, earth.radius_m, SLACK))
+        };
+        Self {
+            directions: (0..directions).map(rays).collect(),
+        }
     }
-    for share in &mut shares {
-        // Voids stay NaN.
-        *share = (*share / directions as f32).clamp(0.0, 1.0);
+
+    /// Its shares (see [`sky_share`]) of `rows`, row by row: at most [`super::ROWS`] of them, beginning with a multiple of that.
+    ///
+    /// # Errors
+    /// What the ground meets.
+    pub fn rows(
+        &self,
+        relief: &Relief<'_>,
+        rows: Range<i64>,
+        out: &mut [f32],
+        work: &dyn Work,
+    ) -> Result<()> {
+        each_block(relief, rows, out, work, |block, scratch, sums| {
+            relief.settle(block, scratch)?;
+            let [mut tangents, mut rises] = std::mem::take(&mut scratch.kept);
+            tangents.resize(sums.len(), 0.0);
+            rises.clear();
+            let slopes = relief.slopes(scratch);
+            for group in 0..sums.len() / LANES {
+                slopes
+                    .rises(place(group as u32))
+                    .iter()
+                    .for_each(|rises_of| rises.extend(rises_of));
+            }
+            for ([east, south], rays) in &self.directions {
+                let towards = |rises: &[f32], l: usize| rises[l] * east + rises[LANES + l] * south;
+                for (tangents, rises) in tangents
+                    .chunks_exact_mut(LANES)
+                    .zip(rises.chunks_exact(2 * LANES))
+                {
+                    for l in 0..LANES {
+                        tangents[l] = towards(rises, l).max(0.0); // 0 at voids too
+                    }
+                }
+                relief.raise(rays, block, f32::INFINITY, &mut tangents, scratch)?;
+                let groups = tangents.chunks_exact(LANES).zip(rises.chunks_exact(2 * LANES));
+                for (sums, (tangents, rises)) in sums.chunks_exact_mut(LANES).zip(groups) {
+                    for l in 0..LANES {
+                        let (e, s) = (rises[l], rises[LANES + l]);
+                        // cos S, and sin S cos(phi - A), as the normal leans down the slope.
+                        let up = 1.0 / (1.0 + e * e + s * s).sqrt();
+                        let lean = -towards(rises, l) * up;
+                        let tangent = tangents[l].min(1e9);
+                        let sin_h_squared = 1.0 / (1.0 + tangent * tangent);
+                        let h = arc_cotangent(tangent);
+                        sums[l] += up * sin_h_squared + lean * (h - tangent * sin_h_squared);
+                    }
+                }
+            }
+            for share in sums {
+                // Voids stay NaN.
+                *share = (*share / self.directions.len() as f32).clamp(0.0, 1.0);
+            }
+            scratch.kept = [tangents, rises];
+            Ok(())
+        })
     }
-    Ok(shares)
 }
 
 /// The angle whose cotangent is `x`, at least 0, within 1e-6: by formula 4.4.49 of M. Abramowitz and I. A. Stegun,

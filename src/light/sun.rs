@@ -1,10 +1,12 @@
 //! The sun's share: how much of its disc stands over the horizon, times the cosine of its incidence.
 
+use std::ops::Range;
+
+use super::crests::Crests;
 use super::earth::Earth;
-use super::horizon::each_lanes;
-use super::normal::Slopes;
+use super::horizon::{all_rows, each_block};
 use super::rays::{Rays, direction};
-use super::relief::Relief;
+use super::relief::{LANES, Relief, Whole, place};
 use super::{check, misuse};
 use crate::error::Result;
 use crate::grid::Grid;
@@ -103,46 +105,98 @@ pub fn sun_share_on(
     progress: &dyn Progress,
 ) -> Result<Vec<f32>> {
     check(grid, heights.len())?;
-    sun.check()?;
-    let sun = Sun {
-        azimuth_deg: earth.on_grid_deg(sun.azimuth_deg),
-        ..sun
-    };
+    let light = Sunlight::new(grid, earth, sun)?;
     progress.begin("sun", grid.size.height as u64);
-    let mut shares = vec![0.0; heights.len()];
-    let altitude = sun.altitude_deg.to_radians();
-    let radius = (DISC_DEG / 2.0).to_radians();
-    let relief = Relief::new(heights, grid, work);
-    let rays = Rays::new(grid, sun.azimuth_deg, earth.radius_m, 0.0);
-    let slopes = Slopes::new(heights, grid);
-    let to_sun = sun.direction().map(|c| c as f32);
-    // Horizons below the disc hide nothing, those above it all. Beyond a right angle tangents turn negative.
-    let from = (altitude - radius).tan().max(0.0) as f32;
-    let until = if altitude + radius < std::f64::consts::FRAC_PI_2 {
-        (altitude + radius).tan() as f32
-    } else {
-        f32::INFINITY
-    };
-    // Of a sun that has set nothing is left, not even over flat ground.
-    let from = if altitude <= -radius { f32::INFINITY } else { from };
-    let lowest = disc_share(f64::from(from).atan(), altitude) as f32;
-    each_lanes(&mut shares, grid, "sun", work, progress, |[i, j], shares| {
-        let count = shares.len();
-        let cosines = slopes.cosines([i, j], count, to_sun);
-        // What turns away from the sun needs no ray.
-        let mut tangents = cosines.map(|cosine| if cosine > 0.0 { from } else { f32::INFINITY });
-        relief.raise(&rays, [i, j], until, &mut tangents[..count]);
-        for ((share, cosine), tangent) in shares.iter_mut().zip(cosines).zip(tangents) {
-            *share = if cosine.is_nan() {
-                f32::NAN
-            } else if tangent == f32::INFINITY {
-                0.0
-            } else if tangent <= from {
-                (lowest * cosine).min(1.0)
-            } else {
-                ((disc_share(f64::from(tangent).atan(), altitude) as f32) * cosine).min(1.0)
-            };
-        }
-    })?;
-    Ok(shares)
+    let whole = Whole::of(heights, grid);
+    let relief = Relief::new(grid, &whole, Crests::of(heights, grid, work));
+    all_rows(grid, "sun", progress, |rows, out| {
+        light.rows(&relief, rows, out, work)
+    })
+}
+
+/// The light of a sun over a grid.
+pub struct Sunlight {
+    rays: Rays,
+    altitude: f64,
+    /// Horizons up to the first tangent hide nothing, those from the second on all of the disc.
+    from: f32,
+    until: f32,
+    /// The share of the disc over the first.
+    lowest: f32,
+    to_sun: [f32; 3],
+}
+
+impl Sunlight {
+    /// That of `sun` over `grid` on `earth`.
+    ///
+    /// # Errors
+    /// Those of [`Sun::check`].
+    pub fn new(grid: &Grid, earth: &Earth, sun: Sun) -> Result<Self> {
+        sun.check()?;
+        let sun = Sun {
+            azimuth_deg: earth.on_grid_deg(sun.azimuth_deg),
+            ..sun
+        };
+        let altitude = sun.altitude_deg.to_radians();
+        let radius = (DISC_DEG / 2.0).to_radians();
+        // Horizons below the disc hide nothing, those above it all. Beyond a right angle tangents turn negative.
+        let from = (altitude - radius).tan().max(0.0) as f32;
+        let until = if altitude + radius < std::f64::consts::FRAC_PI_2 {
+            (altitude + radius).tan() as f32
+        } else {
+            f32::INFINITY
+        };
+        // Of a sun that has set nothing is left, not even over flat ground.
+        let from = if altitude <= -radius { f32::INFINITY } else { from };
+        Ok(Self {
+            rays: Rays::new(grid, sun.azimuth_deg, earth.radius_m, 0.0),
+            altitude,
+            from,
+            until,
+            lowest: disc_share(f64::from(from).atan(), altitude) as f32,
+            to_sun: sun.direction().map(|c| c as f32),
+        })
+    }
+
+    /// Its shares (see [`sun_share`]) of `rows`, row by row: at most [`super::ROWS`] of them, beginning with a multiple of that.
+    ///
+    /// # Errors
+    /// What the ground meets.
+    pub fn rows(
+        &self,
+        relief: &Relief<'_>,
+        rows: Range<i64>,
+        out: &mut [f32],
+        work: &dyn Work,
+    ) -> Result<()> {
+        each_block(relief, rows, out, work, |block, scratch, shares| {
+            relief.settle(block, scratch)?;
+            let mut cosines = std::mem::take(&mut scratch.kept[0]);
+            cosines.clear();
+            let slopes = relief.slopes(scratch);
+            for (at, tangents) in shares.chunks_exact_mut(LANES).enumerate() {
+                let here = slopes.cosines(place(at as u32), self.to_sun);
+                // What turns away from the sun needs no ray.
+                tangents.copy_from_slice(
+                    &here.map(|cosine| if cosine > 0.0 { self.from } else { f32::INFINITY }),
+                );
+                cosines.extend(here);
+            }
+            relief.raise(&self.rays, block, self.until, shares, scratch)?;
+            for (share, &cosine) in shares.iter_mut().zip(&cosines) {
+                let tangent = *share;
+                *share = if cosine.is_nan() {
+                    f32::NAN
+                } else if tangent == f32::INFINITY {
+                    0.0
+                } else if tangent <= self.from {
+                    (self.lowest * cosine).min(1.0)
+                } else {
+                    ((disc_share(f64::from(tangent).atan(), self.altitude) as f32) * cosine).min(1.0)
+                };
+            }
+            scratch.kept[0] = cosines;
+            Ok(())
+        })
+    }
 }

@@ -34,6 +34,9 @@ pub const TILE: i64 = 256;
 /// Steps of a level by which the filter of any kernel, cascaded from level 0, stays below: see [`TileRow::seen`].
 const FILTER_REACH: i64 = 64;
 
+/// Steps of a level by which light reaches farther than its filter: under voids it comes from samples beside them.
+const LIGHT_REACH: i64 = FILTER_REACH + 16;
+
 /// The greatest side of a part: OpenEXR's windows end below 2^30 - 1.
 pub const MAX_SIDE: i64 = (1 << 30) - 2;
 
@@ -121,9 +124,9 @@ pub struct TileRow {
     pub part: usize,
     /// Row of tiles.
     pub y: i64,
-    /// Rows of level 0 after which it is certainly known, at most the DEM's. Of heights and light those under the tiles
-    /// and 64 of the level's own steps more: a kernel of 32 lobes reaches 63 samples of the next finer level, as many of
-    /// the one below that, and so on, in all less than 63 steps of the level. Of bounds those under the patches and one
+    /// Rows of level 0 after which it is certainly known, at most the DEM's. Of heights those under the tiles and 64 of the
+    /// level's own steps more, of light 80: a kernel of 32 lobes reaches 63 samples of the next finer level, as many of
+    /// the one below that, and so on, in all less than 63 steps of the level; and light is filled 16 samples into voids. Of bounds those under the patches and one
     /// patch more: saturation asks the next finer level for one patch more than the children, and so on down.
     pub seen: i64,
 }
@@ -251,7 +254,8 @@ impl Layout {
             for y in 0..self.parts[part].tiles().height {
                 let under = match (kind, level) {
                     (Kind::Height, 0) => (y + 1) * TILE,
-                    (Kind::Height | Kind::Light, _) => (y + 1) * TILE + FILTER_REACH,
+                    (Kind::Height, _) => (y + 1) * TILE + FILTER_REACH,
+                    (Kind::Light, _) => (y + 1) * TILE + LIGHT_REACH,
                     (Kind::Bounds, _) => ((y + 1) * TILE + 1) * PATCH,
                     (Kind::Check | Kind::CheckBounds, _) => rows,
                 };
@@ -346,7 +350,12 @@ mod tests {
             let layout = Layout::new(&grid, true).unwrap();
             for row in layout.order() {
                 let Part { kind, level, size } = layout.parts()[row.part];
-                let last = ((row.y + 1) * TILE).min(size.height) - 1;
+                let beside = if kind == Kind::Light {
+                    crate::light::LIGHT_ROWS_BESIDE
+                } else {
+                    0
+                };
+                let last = ((row.y + 1) * TILE + beside).min(size.height) - 1;
                 // The row of level 0 that the last row of the tile needs, by walking down.
                 let mut needs = last;
                 for finer in (0..level).rev() {

@@ -349,6 +349,42 @@ impl TerrainFile {
         Ok(Arrival::Arrived)
     }
 
+    /// Copies the heights of `rect`, which lies on the level, into `out`, whose rows are `stride` samples apart.
+    pub(crate) fn heights_strided(
+        &self,
+        level: u32,
+        rect: Rect,
+        stride: usize,
+        out: &mut [f32],
+    ) -> Result<()> {
+        let part = self.layout.part(Kind::Height, level);
+        let tile_of = |n: i64| n / super::layout::TILE;
+        let tiles = Rect::new(
+            tile_of(rect.x0),
+            tile_of(rect.z0),
+            tile_of(rect.x1 - 1) + 1,
+            tile_of(rect.z1 - 1) + 1,
+        );
+        for (x, y) in tiles.cells() {
+            let tile_rect = self.layout.parts()[part].tile_rect(x, y);
+            let both = tile_rect.intersection(rect);
+            let tile = self.tile(part, x, y)?;
+            let count = both.width() as usize;
+            for z in both.z0..both.z1 {
+                let from = ((z - tile_rect.z0) * tile_rect.width() + both.x0 - tile_rect.x0) as usize;
+                let to = (z - rect.z0) as usize * stride + (both.x0 - rect.x0) as usize;
+                let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut out[to..to + count]);
+                bytes.copy_from_slice(&tile[4 * from..4 * (from + count)]);
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads tile (x, y) of a level's heights into the cache, if it is not there.
+    pub(crate) fn hold_heights(&self, level: u32, x: i64, y: i64) -> Result<()> {
+        self.tile(self.layout.part(Kind::Height, level), x, y).map(drop)
+    }
+
     fn broken(&self, part: usize, x: i64, y: i64, what: impl std::fmt::Display) -> Error {
         let part = self.layout.parts()[part].name();
         Error::new(

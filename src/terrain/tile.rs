@@ -3,6 +3,8 @@
 //! A decoded tile is row by row, in each row channel by channel. Samples are in the machine's own byte order,
 //! as the exr crate has them; files and checks are little-endian.
 
+use half::f16;
+
 use bytemuck::{Pod, bytes_of, pod_read_unaligned};
 
 use crate::grid::Rect;
@@ -58,6 +60,25 @@ pub(crate) fn pack_columns<T: Pod, const N: usize>(
     bytes
 }
 
+/// Lays some columns of rows of light, `width` samples wide, out as a tile: of [sun, sky], where no sky stands for 1.
+pub(crate) fn pack_light(shares: &[Vec<f16>; 2], width: usize, columns: std::ops::Range<i64>) -> Vec<u8> {
+    let [sun, sky] = shares;
+    let columns = columns.start as usize..columns.end as usize;
+    let whole = vec![f16::ONE; columns.len()];
+    let mut bytes = Vec::with_capacity(sun.len() / width * columns.len() * 4);
+    for row in (0..sun.len()).step_by(width) {
+        let columns = row + columns.start..row + columns.end;
+        let sky = if sky.is_empty() {
+            &whole
+        } else {
+            &sky[columns.clone()]
+        };
+        bytes.extend_from_slice(bytemuck::cast_slice(sky));
+        bytes.extend_from_slice(bytemuck::cast_slice(&sun[columns]));
+    }
+    bytes
+}
+
 /// Copies what `tile` (its samples lie at `tile_rect`) has of `rect` into `out`, which holds `rect` row by row.
 pub(super) fn unpack<T: Pod, const N: usize>(
     tile: &[u8],
@@ -92,7 +113,6 @@ mod tests {
     use super::*;
     use crate::levels::{Bounds, LightSample};
     use crate::terrain::layout::{Kind, Part};
-    use half::f16;
 
     #[test]
     fn rows_hold_one_channel_after_another_and_come_back() {
@@ -147,6 +167,14 @@ mod tests {
         let bytes = pack::<u16, 2>(&[bytemuck::cast(light)], 1, LIGHT_FIELDS);
         assert_eq!(part(Kind::Light).channels().0, ["sky", "sun"]);
         assert_eq!(bytes, [bytes_of(&light.sky), bytes_of(&light.sun)].concat());
+        // Share by share the same, and where the sky is whole.
+        assert_eq!(pack_light(&[vec![light.sun], vec![light.sky]], 1, 0..1), bytes);
+        let whole = LightSample {
+            sky: f16::ONE,
+            ..light
+        };
+        let bytes = pack::<u16, 2>(&[bytemuck::cast(whole)], 1, LIGHT_FIELDS);
+        assert_eq!(pack_light(&[vec![light.sun], Vec::new()], 1, 0..1), bytes);
     }
 
     #[test]

@@ -50,31 +50,7 @@ pub fn write<W: Write + Seek + Sync>(
     }
     let mut writer = TerrainWriter::new(out, meta)?;
     progress.begin("write", writer.layout.tile_count());
-    for TileRow { part, y, .. } in writer.layout.order() {
-        let width = writer.layout.parts()[part].tiles().width;
-        for x0 in (0..width).step_by(BATCH as usize) {
-            if progress.cancelled() {
-                return Err(Error::cancelled(SUBJECT));
-            }
-            let count = BATCH.min(width - x0) as usize;
-            let slots: Vec<Mutex<Option<Result<EncodedTile>>>> =
-                (0..count).map(|_| Mutex::default()).collect();
-            work.each(count, &|index| {
-                let x = x0 + index as i64;
-                let tile = writer
-                    .decoded(part, x, y, levels)
-                    .and_then(|b| writer.encode(part, x, y, b));
-                *slots[index]
-                    .lock()
-                    .expect("each slot is locked once, by its own task") = Some(tile);
-            });
-            for slot in slots {
-                let tile = slot.into_inner().ok().flatten();
-                writer.put(tile.expect("every task ran and left its tile")?)?;
-            }
-            progress.advance(count as u64);
-        }
-    }
+    writer.copy(writer.layout.order(), levels, work, progress)?;
     writer.finish()
 }
 
@@ -219,6 +195,48 @@ impl<W: Write + Seek> TerrainWriter<W> {
         if let Some(at) = self.layout.check_of(part, x, y) {
             let width = self.layout.parts()[at.part].size.width;
             self.checks[at.part][(at.y * width + at.x) as usize][at.channel] = check;
+        }
+        Ok(())
+    }
+
+    /// Puts rows of tiles of `levels`, or of the checks so far. Progress advances by tiles.
+    ///
+    /// # Errors
+    /// What the file or `levels` meet; [`ErrorKind::Cancelled`].
+    pub fn copy(
+        &mut self,
+        rows: Vec<TileRow>,
+        levels: &dyn Levels,
+        work: &dyn Work,
+        progress: &dyn Progress,
+    ) -> Result<()>
+    where
+        W: Sync,
+    {
+        for TileRow { part, y, .. } in rows {
+            let width = self.layout.parts()[part].tiles().width;
+            for x0 in (0..width).step_by(BATCH as usize) {
+                if progress.cancelled() {
+                    return Err(Error::cancelled(SUBJECT));
+                }
+                let count = BATCH.min(width - x0) as usize;
+                let slots: Vec<Mutex<Option<Result<EncodedTile>>>> =
+                    (0..count).map(|_| Mutex::default()).collect();
+                work.each(count, &|index| {
+                    let x = x0 + index as i64;
+                    let tile = self
+                        .decoded(part, x, y, levels)
+                        .and_then(|b| self.encode(part, x, y, b));
+                    *slots[index]
+                        .lock()
+                        .expect("each slot is locked once, by its own task") = Some(tile);
+                });
+                for slot in slots {
+                    let tile = slot.into_inner().ok().flatten();
+                    self.put(tile.expect("every task ran and left its tile")?)?;
+                }
+                progress.advance(count as u64);
+            }
         }
         Ok(())
     }

@@ -155,6 +155,8 @@ impl Graphics {
     /// # Errors
     /// [`ErrorKind::Device`] where the surface cannot be replaced, and for what the device has complained about.
     pub(super) fn acquire(&mut self) -> Result<Acquired> {
+        // That it is lost is heard only by who asks; a device that is may not even be asked.
+        let _ = self.gpu.device.poll(wgpu::PollType::Poll);
         self.check()?;
         for _ in 0..2 {
             if self.complaints.lost.load(Ordering::Relaxed) {

@@ -65,6 +65,9 @@ pub struct WindowOptions {
     pub stem: String,
     /// The command that replays a flight, up to the flag that names it.
     pub replay: String,
+    /// Whether F12 loses the graphics device: tests do what drivers do.
+    #[doc(hidden)]
+    pub loses_device: bool,
 }
 
 /// Opens a window, flies in it until it is closed, and says in lines what was written and what is wrong with the data.

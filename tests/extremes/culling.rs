@@ -99,8 +99,15 @@ fn random_cameras_see_the_same_with_and_without_culling() {
     let noise = pyramid(Grid::new(333, 600, [20.0, 20.0]), |i, j| {
         9000.0 * hash(2, i, j) as f32
     });
+    let gaps = pyramid(Grid::new(600, 700, [10.0, 8.0]), |i, j| {
+        if hash(6, i / 8, j / 11) < 0.05 {
+            f32::NAN
+        } else {
+            rough(i, j)
+        }
+    });
     for vertical_scale in [1.0, -2.0, 1000.0, 0.0] {
-        for (name, levels) in [("hills", &hills), ("noise", &noise)] {
+        for (name, levels) in [("hills", &hills), ("noise", &noise), ("gaps", &gaps)] {
             let clipmap = ClipmapOptions {
                 clip_size: random.pick(&[64, 128]),
                 vertical_scale,
@@ -109,7 +116,7 @@ fn random_cameras_see_the_same_with_and_without_culling() {
             };
             let (changed, terrain) = changed(levels, clipmap, 25, &mut random);
             assert_eq!(changed, 0, "seed {seed}: {name} with {clipmap:?}");
-            assert!(terrain > 5000 || vertical_scale == 0.0, "{terrain} pixels");
+            assert!(terrain > 2000 || vertical_scale == 0.0, "{terrain} pixels");
         }
     }
     // Control: bounds that say less than is there are caught.

@@ -38,6 +38,10 @@ pub(in crate::cli) struct FlyArgs {
     #[arg(long, value_name = "DIR", default_value = ".", hide_default_value = true)]
     pub(in crate::cli) output_dir: PathBuf,
 
+    /// F12 loses the graphics device, for tests
+    #[arg(long, hide = true)]
+    pub(in crate::cli) loses_device: bool,
+
     /// Show no warnings, and say not what was written
     #[arg(long, short)]
     pub(in crate::cli) quiet: bool,

@@ -197,6 +197,7 @@ impl ViewArgs {
             transition: self.transition,
             vertical_scale: self.vertical_scale,
             cull: !self.no_cull,
+            occlusion: !self.no_cull,
             max_error_px: self.max_error_px,
             wait: self.wait,
             upload_budget_bytes: self.upload_budget,

@@ -23,6 +23,13 @@ const NOTCH_PX: f64 = 40.0;
 
 impl App<'_> {
     fn key(&mut self, events: &ActiveEventLoop, code: KeyCode, down: bool, repeat: bool) {
+        if code == KeyCode::F12
+            && down
+            && self.options.loses_device
+            && let Some(graphics) = &self.graphics
+        {
+            graphics.gpu.device.destroy();
+        }
         match controls::does(code) {
             Some(Does::Move(_)) => self.held.set(code, down),
             Some(Does::Act(action)) if down && (!repeat || action.repeats()) => self.act(events, action),

@@ -1,0 +1,111 @@
+//! How high the terrain reaches near each place, coarsely, for all of a DEM: what tells which of it need be looked at.
+
+use crate::grid::{Grid, Rect};
+use crate::work::{Work, each_chunk};
+
+use super::rays::STAGE;
+use super::relief::{LANES, greater, slide};
+
+/// Samples along a block's side.
+pub const CREST: usize = 64;
+
+/// The greatest heights over blocks of [`CREST`] samples a side: 4 bytes for each.
+#[derive(Clone, Debug)]
+pub struct Crests {
+    wide: usize,
+    high: usize,
+    highest: Vec<f32>,
+}
+
+impl Crests {
+    /// Those of a DEM of `grid` of which nothing is known yet, as if it were void.
+    pub fn new(grid: &Grid) -> Self {
+        let count = |n: i64| (n as usize).div_ceil(CREST);
+        let (wide, high) = (count(grid.size.width), count(grid.size.height));
+        Self {
+            wide,
+            high,
+            highest: vec![f32::NEG_INFINITY; wide * high],
+        }
+    }
+
+    /// Those of `heights`, as many as `grid` has samples.
+    pub fn of(heights: &[f32], grid: &Grid, work: &dyn Work) -> Self {
+        let mut crests = Self::new(grid);
+        let (wide, width) = (crests.wide, grid.size.width as usize);
+        each_chunk(work, &mut crests.highest, wide, |z, highest| {
+            let rows = &heights[z * CREST * width..heights.len().min((z + 1) * CREST * width)];
+            highest.copy_from_slice(&Self::measure(rows, width));
+        });
+        crests
+    }
+
+    /// The greatest heights over the blocks of `heights`, rows of `width` samples, row by row; minus infinity where all
+    /// is void.
+    pub fn measure(heights: &[f32], width: usize) -> Vec<f32> {
+        let mut most = Vec::new();
+        let mut columns = vec![0f32; width];
+        for rows in heights.chunks(CREST * width) {
+            columns.fill(f32::NEG_INFINITY);
+            for row in rows.chunks(width) {
+                columns
+                    .iter_mut()
+                    .zip(row)
+                    .for_each(|(most, &h)| *most = greater(*most, h));
+            }
+            let blocks = columns.chunks(CREST);
+            most.extend(
+                blocks.map(|block| block.iter().fold(f32::NEG_INFINITY, |most, &h| greater(most, h))),
+            );
+        }
+        most
+    }
+
+    /// Puts what [`Crests::measure`] says of `rect`, whose north-western corner is one of a block.
+    pub fn put(&mut self, rect: Rect, measured: &[f32]) {
+        let across = (rect.width() as usize).div_ceil(CREST);
+        let (x, z) = (rect.x0 as usize / CREST, rect.z0 as usize / CREST);
+        for (z, row) in (z..).zip(measured.chunks(across)) {
+            self.highest[z * self.wide + x..][..across].copy_from_slice(row);
+        }
+    }
+
+    /// The greatest of all; minus infinity where all is void.
+    pub(super) fn greatest(&self) -> f32 {
+        self.highest
+            .iter()
+            .fold(f32::NEG_INFINITY, |most, &h| greater(most, h))
+    }
+
+    /// The greatest over windows from each block on that hold a stage of rays as [`LANES`] samples see it.
+    pub(super) fn into_windows(self) -> CrestWindows {
+        // A stage's samples begin anywhere in a block, and reach two beyond its cells.
+        let count = |samples: usize| (samples + CREST - 1).div_ceil(CREST);
+        let across = slide(&self.highest, self.wide, false, count(STAGE as usize + 2 + LANES));
+        CrestWindows {
+            wide: self.wide,
+            high: self.high,
+            highest: slide(&across, self.wide, true, count(STAGE as usize + 2)),
+        }
+    }
+}
+
+/// See [`Crests::into_windows`].
+pub(super) struct CrestWindows {
+    wide: usize,
+    high: usize,
+    highest: Vec<f32>,
+}
+
+impl CrestWindows {
+    /// The greatest height of a stage whose north-western corner, as the first of some samples sees it, is (x, z).
+    pub(super) fn highest(&self, x: i64, z: i64) -> f32 {
+        // What lies west or north of the DEM holds nothing.
+        let (x, z) = (x.max(0) as usize / CREST, z.max(0) as usize / CREST);
+        if x < self.wide && z < self.high {
+            self.highest[z * self.wide + x]
+        } else {
+            f32::NEG_INFINITY
+        }
+    }
+}
