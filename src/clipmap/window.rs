@@ -1,5 +1,7 @@
 //! A level's window: which samples are resident, and their mirror on the CPU, from which the GPU is fed.
 
+mod take_over;
+
 use half::f16;
 
 use super::arrivals::Faults;
@@ -371,42 +373,6 @@ impl Window {
         }
     }
 
-    /// Notes that samples of `other`, a window over the same ground, will lie beside its own: bounds of both hold.
-    pub(super) fn meet_bounds(&mut self, other: &Self) {
-        for (own, other) in self.patches.iter_mut().zip(&other.patches) {
-            if let (Some(own), Some(other)) = (own, other) {
-                own.bounds = both(&own.bounds, &other.bounds);
-                own.voids |= other.voids;
-            }
-        }
-    }
-
-    /// Takes the samples `rect` and their light from `other`, a window over the same ground that has them, and lists the
-    /// rectangles that were written.
-    pub(super) fn take_samples(&mut self, other: &Self, rect: Rect, written: &mut LevelPlan) {
-        let light = self.light_of(rect);
-        for piece in other.pieces(rect) {
-            let at = self.slot_of(piece.x0, piece.z0);
-            copy_slots(&other.heights, &mut self.heights, at, piece, self.n);
-        }
-        for piece in other.light_pieces(light) {
-            let at = self.light_slot_of(piece.x0, piece.z0);
-            copy_slots(&other.light, &mut self.light, at, piece, self.light_n);
-        }
-        written.heights.extend(self.pieces(rect));
-        written.light.extend(self.light_pieces(light));
-    }
-
-    /// Takes what `other`, a window over the same ground whose samples it has all taken, knows of the patches.
-    pub(super) fn take_bounds(&mut self, other: &Self) {
-        for (own, other) in self.patches.iter_mut().zip(&other.patches) {
-            if own.is_some() && other.is_some() {
-                *own = *other;
-            }
-        }
-        self.provisional = other.provisional;
-    }
-
     fn index(&self, i: i64, j: i64) -> usize {
         let [x, z] = self.slot_of(i, j);
         (z * self.n + x) as usize
@@ -443,15 +409,6 @@ pub(super) struct Scratch {
     pub(super) shares: Vec<crate::levels::LightSample>,
     pub(super) texels: Vec<LightTexel>,
     pub(super) rows: relief::Rows,
-}
-
-/// Copies the slots of `rect`, which begin at column and row `at`, from one square of `n` slots a side to another.
-fn copy_slots<T: Copy>(from: &[T], to: &mut [T], at: [i64; 2], rect: Rect, n: i64) {
-    let width = rect.width() as usize;
-    for z in at[1]..at[1] + rect.height() {
-        let first = (z * n + at[0]) as usize;
-        to[first..first + width].copy_from_slice(&from[first..first + width]);
-    }
 }
 
 /// Copies a rectangle's rows into the rows of a square of `n` slots, from its first slot on.
