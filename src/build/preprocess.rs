@@ -112,7 +112,7 @@ pub fn preprocess(
     }
     let earth = Earth::of(&description.grid, description.place.as_ref(), options.curvature)
         .map_err(|e| e.about(&description.name))?;
-    let needed = |grid: &Grid| preprocess_bytes(grid, options.light.as_ref(), source.held_bytes());
+    let needed = |grid: &Grid| preprocess_bytes(grid, options.light.is_some(), source.held_bytes());
     let advice = if options.light.is_some() {
         "leave out the light, or cut the DEM"
     } else {

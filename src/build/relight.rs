@@ -39,7 +39,7 @@ pub fn relight(
     if let Some(light) = &options.light {
         light.sun.check()?;
         // The file's own cache is what holds tiles.
-        let needed = |grid: &Grid| preprocess_bytes(grid, Some(light), DEFAULT_CACHE_BYTES as u64);
+        let needed = |grid: &Grid| preprocess_bytes(grid, true, DEFAULT_CACHE_BYTES as u64);
         memory::check(
             file.name(),
             grid,
