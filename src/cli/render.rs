@@ -103,6 +103,9 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     if args.measure {
         headless.measure()?;
     }
+    if args.view.stats.is_some() || args.view.max_error_px.is_some() {
+        headless.certify();
+    }
     let frames = match &shots {
         Shots::Flight(flight) => recording.record(&mut headless, levels, flight, terminal)?,
         Shots::Still(camera) => {

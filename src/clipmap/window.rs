@@ -1,5 +1,7 @@
 //! A level's window: which samples are resident, and their mirror on the CPU, from which the GPU is fed.
 
+mod take_over;
+
 use half::f16;
 
 use super::arrivals::Faults;
@@ -406,6 +408,7 @@ pub(super) struct Scratch {
     pub(super) relief: Vec<f32>,
     pub(super) shares: Vec<crate::levels::LightSample>,
     pub(super) texels: Vec<LightTexel>,
+    pub(super) rows: relief::Rows,
 }
 
 /// Copies a rectangle's rows into the rows of a square of `n` slots, from its first slot on.
