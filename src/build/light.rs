@@ -81,13 +81,13 @@ pub(super) fn write_light<W: Write + Seek + Sync + Send>(
         let count = (z1 - z0) as usize * width;
         hold(heights, z0, work)?;
         suns.resize(count, 0.0);
-        sun.rows(&relief, z0..z1, &mut suns, work)?;
+        sun.rows(&relief, z0..z1, &mut suns, work, progress)?;
         took.sun_s += start.elapsed().as_secs_f64();
 
         let start = Instant::now();
         if let Some(sky) = &sky {
             skies.resize(count, 0.0);
-            sky.rows(&relief, z0..z1, &mut skies, work)?;
+            sky.rows(&relief, z0..z1, &mut skies, work, progress)?;
         }
         levels.take(&suns, &skies, work);
         took.sky_s += start.elapsed().as_secs_f64();

@@ -2,7 +2,6 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Size};
-use crate::light::LightOptions;
 use crate::terrain::layout::TILE;
 
 /// The ceiling of preprocessing unless another is given: 512 MiB.
@@ -35,13 +34,10 @@ const BYTES_A_COLUMN_WITH_LIGHT: u64 = 5632;
 const BYTES_A_TILE: u64 = 64;
 const BYTES_A_TILE_WITH_LIGHT: u64 = 256;
 
-/// What does not depend on the DEM: the program, and tiles being compressed; with light the terrain that blocks look at,
-/// and the tiles that are kept at least.
+/// What does not depend on the DEM: the program, and tiles being compressed; with light the crossings of its rays with
+/// cell edges (25 MiB), the terrain that blocks look at, and the tiles that are kept at least.
 const FIXED_BYTES: u64 = 64 << 20;
-const FIXED_BYTES_WITH_LIGHT: u64 = 96 << 20;
-
-/// Bytes of a direction in which light is traced: its crossings with cell edges, as far as they are kept.
-const BYTES_A_DIRECTION: u64 = 160 << 10;
+const FIXED_BYTES_WITH_LIGHT: u64 = 120 << 20;
 
 /// Decoded tiles that are kept while light is traced, at least.
 const LEAST_CACHE_BYTES: u64 = 16 << 20;
@@ -59,14 +55,15 @@ pub fn needed_bytes(grid: &Grid, light: bool) -> u64 {
 
 /// The memory that preprocessing a DEM of `grid` takes, in bytes, where its source holds `held_bytes`: whatever its
 /// height but for some bytes a tile.
-pub fn preprocess_bytes(grid: &Grid, light: Option<&LightOptions>, held_bytes: u64) -> u64 {
-    let (a_column, a_tile, fixed) = match light {
-        None => (BYTES_A_COLUMN, BYTES_A_TILE, FIXED_BYTES),
-        Some(light) => (
+pub fn preprocess_bytes(grid: &Grid, light: bool, held_bytes: u64) -> u64 {
+    let (a_column, a_tile, fixed) = if light {
+        (
             BYTES_A_COLUMN_WITH_LIGHT,
             BYTES_A_TILE_WITH_LIGHT,
-            FIXED_BYTES_WITH_LIGHT + u64::from(light.sky_directions) * BYTES_A_DIRECTION,
-        ),
+            FIXED_BYTES_WITH_LIGHT,
+        )
+    } else {
+        (BYTES_A_COLUMN, BYTES_A_TILE, FIXED_BYTES)
     };
     let tiles = grid.size.samples() as u64 / (TILE * TILE) as u64;
     (grid.size.width as u64)
@@ -78,8 +75,8 @@ pub fn preprocess_bytes(grid: &Grid, light: Option<&LightOptions>, held_bytes: u
 
 /// The bytes of decoded tiles that are kept while light is traced, where `left_bytes` of the ceiling are left.
 pub(super) fn cache_bytes(left_bytes: u64) -> usize {
-    // Tiles and what becomes of their memory once they are let go.
-    usize::try_from(LEAST_CACHE_BYTES + left_bytes / 8 * 7).unwrap_or(usize::MAX)
+    // Memory of tiles that are let go is not all of use for others at once.
+    usize::try_from(LEAST_CACHE_BYTES + left_bytes / 2).unwrap_or(usize::MAX)
 }
 
 /// The bytes of the heights of all levels of a DEM of `grid` as tiles that are kept, and a little more.
@@ -140,15 +137,14 @@ mod tests {
     #[test]
     fn a_dem_above_the_ceiling_is_refused_with_the_number_it_needs() {
         let grid = Grid::new(13201, 13201, [1.0, 1.0]);
-        let light = LightOptions::default();
         let with = |light| move |grid: &Grid| preprocess_bytes(grid, light, 0);
-        let needed = preprocess_bytes(&grid, Some(&light), 0);
-        assert!(check("a.tif", &grid, with(Some(&light)), needed, "or cut it").is_ok());
-        let error = check("a.tif", &grid, with(Some(&light)), needed - 1, "or cut it").unwrap_err();
+        let needed = preprocess_bytes(&grid, true, 0);
+        assert!(check("a.tif", &grid, with(true), needed, "or cut it").is_ok());
+        let error = check("a.tif", &grid, with(true), needed - 1, "or cut it").unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Limit);
         let number = format!("{} MiB", needed.div_ceil(1 << 20));
         assert!(error.to_string().contains(&number), "{error}");
-        assert!(preprocess_bytes(&grid, None, 0) < needed);
+        assert!(preprocess_bytes(&grid, false, 0) < needed);
         let most = Grid::new(1 << 30, 1 << 30, [1.0, 1.0]);
         assert_eq!(needed_bytes(&most, true), u64::MAX, "more than can be counted");
         assert!(
@@ -163,7 +159,7 @@ mod tests {
         );
         let none = Grid::new(i64::MAX, i64::MAX, [1.0, 1.0]);
         assert_eq!(
-            check("a.tif", &none, with(Some(&light)), u64::MAX, "or cut it")
+            check("a.tif", &none, with(true), u64::MAX, "or cut it")
                 .unwrap_err()
                 .kind(),
             ErrorKind::Misuse
@@ -172,15 +168,7 @@ mod tests {
 
     #[test]
     fn the_height_of_a_dem_costs_next_to_nothing() {
-        for (light, a_tile, fixed, a_column) in [
-            (None, 64, 64 << 20, 4096),
-            (
-                Some(&LightOptions::default()),
-                256,
-                (96 << 20) + 16 * (160 << 10),
-                5632,
-            ),
-        ] {
+        for (light, a_tile, fixed, a_column) in [(false, 64, 64 << 20, 4096), (true, 256, 120 << 20, 5632)] {
             let of = |width, height| preprocess_bytes(&Grid::new(width, height, [1.0, 1.0]), light, 7);
             assert_eq!(of(1000, 1 << 20) - of(1000, 1), (1000 << 20) / 65_536 * a_tile);
             assert_eq!(of(65_536, 1), fixed + 65_536 * a_column + a_tile + 7);

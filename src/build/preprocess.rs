@@ -119,7 +119,7 @@ pub fn preprocess(
     let earth = Earth::of(&description.grid, description.place.as_ref(), options.curvature)
         .map_err(|e| e.about(&description.name))?;
     check_day(options)?;
-    let needed = |grid: &Grid| preprocess_bytes(grid, options.light.as_ref(), source.held_bytes());
+    let needed = |grid: &Grid| preprocess_bytes(grid, options.light.is_some(), source.held_bytes());
     let needed = |grid: &Grid| needed(grid).max(options.day.map_or(0, |_| memory::day_bytes(grid)));
     let advice = if options.light.is_some() {
         "leave out the light, or cut the DEM"

@@ -42,7 +42,7 @@ pub fn relight(
         check_day(options)?;
         // The file's own cache is what holds tiles.
         let needed = |grid: &Grid| {
-            let light = preprocess_bytes(grid, Some(light), DEFAULT_CACHE_BYTES as u64);
+            let light = preprocess_bytes(grid, true, DEFAULT_CACHE_BYTES as u64);
             light.max(options.day.map_or(0, |_| memory::day_bytes(grid)))
         };
         memory::check(

@@ -3,7 +3,6 @@
 use crate::grid::{Grid, Rect};
 use crate::work::{Work, each_chunk};
 
-use super::rays::STAGE;
 use super::relief::{LANES, greater, slide};
 
 /// Samples along a block's side.
@@ -77,20 +76,21 @@ impl Crests {
             .fold(f32::NEG_INFINITY, |most, &h| greater(most, h))
     }
 
-    /// The greatest over windows from each block on that hold a stage of rays as [`LANES`] samples see it.
-    pub(super) fn into_windows(self) -> CrestWindows {
-        // A stage's samples begin anywhere in a block, and reach two beyond its cells.
+    /// The greatest over windows from each block on that hold a stretch of rays of `cells` cells either way, and a sample
+    /// on both sides of it, as [`LANES`] samples see it.
+    pub(super) fn windows(&self, cells: i64) -> CrestWindows {
+        // It begins anywhere in a block.
         let count = |samples: usize| (samples + CREST - 1).div_ceil(CREST);
-        let across = slide(&self.highest, self.wide, false, count(STAGE as usize + 2 + LANES));
+        let across = slide(&self.highest, self.wide, false, count(cells as usize + 2 + LANES));
         CrestWindows {
             wide: self.wide,
             high: self.high,
-            highest: slide(&across, self.wide, true, count(STAGE as usize + 2)),
+            highest: slide(&across, self.wide, true, count(cells as usize + 2)),
         }
     }
 }
 
-/// See [`Crests::into_windows`].
+/// See [`Crests::windows`].
 pub(super) struct CrestWindows {
     wide: usize,
     high: usize,
@@ -98,7 +98,7 @@ pub(super) struct CrestWindows {
 }
 
 impl CrestWindows {
-    /// The greatest height of a stage whose north-western corner, as the first of some samples sees it, is (x, z).
+    /// The greatest height of a stretch whose north-western corner, as the first of some samples sees it, is (x, z).
     pub(super) fn highest(&self, x: i64, z: i64) -> f32 {
         // What lies west or north of the DEM holds nothing.
         let (x, z) = (x.max(0) as usize / CREST, z.max(0) as usize / CREST);

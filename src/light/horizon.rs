@@ -54,7 +54,7 @@ pub fn horizon_tangents_on(
     progress.begin("horizon", grid.size.height as u64);
     let whole = Whole::of(heights, grid);
     let relief = Relief::new(grid, &whole, Crests::of(heights, grid, work));
-    let rays = Rays::new(grid, earth.on_grid_deg(azimuth_deg), earth.radius_m, 0.0);
+    let rays = Rays::new(grid, earth.on_grid_deg(azimuth_deg), earth.radius_m, 0.0, 1);
     all_rows(grid, "horizon", progress, |rows, tangents| {
         each_block(&relief, rows, tangents, work, |block, scratch, tangents| {
             relief.settle(block, scratch)?;

@@ -16,8 +16,9 @@ pub(super) const STAGE: i64 = 256;
 /// Cells that a run spans at most, longest runs first.
 pub(super) const SPANS: [i64; 3] = [64, 16, 4];
 
-/// Stages that are kept; those farther out are made anew by whoever needs them.
-const KEPT: i64 = 4;
+/// Stages that the rays of one light keep in all directions together; those farther out are made anew by whoever needs
+/// them. One takes some 33 KiB.
+const KEPT: u32 = 768;
 
 /// The row stride of what the ends of crossings are offsets in: a stage as all samples of a block see it fits.
 pub(super) const STRIDE: usize = 544;
@@ -106,8 +107,8 @@ pub(super) struct Run {
 
 impl Rays {
     /// The rays at `azimuth_deg`, as far as `grid` reaches, on an earth of `radius_m` (infinite: flat). What could
-    /// raise a tangent by no more than `slack` may be left out.
-    pub(super) fn new(grid: &Grid, azimuth_deg: f64, radius_m: f64, slack: f64) -> Self {
+    /// raise a tangent by no more than `slack` may be left out. They are those of one of `directions`.
+    pub(super) fn new(grid: &Grid, azimuth_deg: f64, radius_m: f64, slack: f64, directions: u32) -> Self {
         let [east, south] = direction(azimuth_deg);
         let (gx, gz) = (east / grid.spacing_m[0], south / grid.spacing_m[1]);
         let along = usize::from(gz.abs() > gx.abs());
@@ -120,7 +121,7 @@ impl Rays {
             stages: (longest + STAGE - 1) / STAGE,
             kept: Vec::new(),
         };
-        for k in 0..rays.stages.min(KEPT) {
+        for k in 0..rays.stages.min((KEPT / directions).into()) {
             let mut stage = Stage::default();
             rays.cross(k, &mut stage);
             stage.boxes = Vec::new();

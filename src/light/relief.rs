@@ -17,7 +17,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::crests::{CrestWindows, Crests};
-use super::rays::{Rays, SPANS, STRIDE, Stage};
+use super::rays::{Rays, SPANS, STAGE, STRIDE, Stage};
 use crate::error::Result;
 use crate::grid::{Grid, Rect};
 
@@ -74,7 +74,8 @@ pub struct Relief<'a> {
     ground: &'a dyn Ground,
     /// The greatest height; minus infinity where all is void.
     greatest: f32,
-    crests: CrestWindows,
+    /// Over stages, and over the longest runs in them.
+    crests: [CrestWindows; 2],
     /// What is not in use.
     scratches: Mutex<Vec<Scratch>>,
 }
@@ -128,7 +129,7 @@ impl<'a> Relief<'a> {
             grid: *grid,
             ground,
             greatest: crests.greatest(),
-            crests: crests.into_windows(),
+            crests: [STAGE, SPANS[0]].map(|cells| crests.windows(cells)),
             scratches: Mutex::default(),
         }
     }
@@ -232,13 +233,10 @@ impl<'a> Relief<'a> {
                     block.x0 + at[0] as i64 + hull.x0,
                     block.z0 + at[1] as i64 + hull.z0,
                 ];
-                if could_rise(
-                    self.crests.highest(corner[0], corner[1]),
-                    stage.per_m,
-                    stage.drop,
-                    h,
-                    t,
-                ) {
+                let most = self.crests[0].highest(corner[0], corner[1]);
+                if could_rise(most, stage.per_m, stage.drop, h, t)
+                    && (k == 0 || self.any_run_could_rise(stage, corner, h, t))
+                {
                     looking.push(group);
                     ends = [
                         ends[0].min(at[0]),
@@ -270,6 +268,26 @@ impl<'a> Relief<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Whether the ground near any of the longest runs of a stage, whose corner as samples of heights `h` see it is given,
+    /// could raise any of `tangents`: what is far mostly cannot, and need not be fetched then.
+    fn any_run_could_rise(
+        &self,
+        stage: &Stage,
+        corner: [i64; 2],
+        h: &[f32; LANES],
+        tangents: &[f32; LANES],
+    ) -> bool {
+        let mut at = 0;
+        while let Some(run) = stage.runs.get(at) {
+            let [x, z] = [0, 1].map(|axis| corner[axis] + i64::from(run.corner[axis]));
+            if could_rise(self.crests[1].highest(x, z), run.per_m, run.drop, h, tangents) {
+                return true;
+            }
+            at = run.next as usize;
+        }
+        false
     }
 
     /// The slopes at a block's samples, whose own heights have been fetched.

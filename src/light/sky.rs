@@ -8,7 +8,7 @@ use super::earth::Earth;
 use super::horizon::{all_rows, each_block};
 use super::rays::{Rays, direction};
 use super::relief::{LANES, Relief, Whole, place};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::progress::Progress;
 use crate::work::Work;
@@ -69,7 +69,7 @@ pub fn sky_share_on(
     let whole = Whole::of(heights, grid);
     let relief = Relief::new(grid, &whole, Crests::of(heights, grid, work));
     all_rows(grid, "sky", progress, |rows, out| {
-        light.rows(&relief, rows, out, work)
+        light.rows(&relief, rows, out, work, progress)
     })
 }
 
@@ -85,7 +85,10 @@ impl Skylight {
         let rays = |k: u32| {
             let azimuth_deg = f64::from(k) * 360.0 / f64::from(directions);
             let towards = direction(azimuth_deg).map(|c| c as f32);
-            (towards, Rays::new(grid, azimuth_deg, earth.radius_m, SLACK))
+            (
+                towards,
+                Rays::new(grid, azimuth_deg, earth.radius_m, SLACK, directions),
+            )
         };
         Self {
             directions: (0..directions).map(rays).collect(),
@@ -95,13 +98,14 @@ impl Skylight {
     /// Its shares (see [`sky_share`]) of `rows`, row by row: at most [`super::ROWS`] of them, beginning with a multiple of that.
     ///
     /// # Errors
-    /// What the ground meets.
+    /// What the ground meets; [`crate::ErrorKind::Cancelled`].
     pub fn rows(
         &self,
         relief: &Relief<'_>,
         rows: Range<i64>,
         out: &mut [f32],
         work: &dyn Work,
+        progress: &dyn Progress,
     ) -> Result<()> {
         each_block(relief, rows, out, work, |block, scratch, sums| {
             relief.settle(block, scratch)?;
@@ -116,6 +120,9 @@ impl Skylight {
                     .for_each(|rises_of| rises.extend(rises_of));
             }
             for ([east, south], rays) in &self.directions {
+                if progress.cancelled() {
+                    return Err(Error::cancelled("sky"));
+                }
                 let towards = |rises: &[f32], l: usize| rises[l] * east + rises[LANES + l] * south;
                 for (tangents, rises) in tangents
                     .chunks_exact_mut(LANES)

@@ -8,7 +8,7 @@ use super::horizon::{all_rows, each_block};
 use super::rays::{Rays, direction};
 use super::relief::{LANES, Relief, Whole, place};
 use super::{check, misuse};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::progress::Progress;
 use crate::work::Work;
@@ -110,7 +110,7 @@ pub fn sun_share_on(
     let whole = Whole::of(heights, grid);
     let relief = Relief::new(grid, &whole, Crests::of(heights, grid, work));
     all_rows(grid, "sun", progress, |rows, out| {
-        light.rows(&relief, rows, out, work)
+        light.rows(&relief, rows, out, work, progress)
     })
 }
 
@@ -149,7 +149,7 @@ impl Sunlight {
         // Of a sun that has set nothing is left, not even over flat ground.
         let from = if altitude <= -radius { f32::INFINITY } else { from };
         Ok(Self {
-            rays: Rays::new(grid, sun.azimuth_deg, earth.radius_m, 0.0),
+            rays: Rays::new(grid, sun.azimuth_deg, earth.radius_m, 0.0, 1),
             altitude,
             from,
             until,
@@ -161,15 +161,19 @@ impl Sunlight {
     /// Its shares (see [`sun_share`]) of `rows`, row by row: at most [`super::ROWS`] of them, beginning with a multiple of that.
     ///
     /// # Errors
-    /// What the ground meets.
+    /// What the ground meets; [`crate::ErrorKind::Cancelled`].
     pub fn rows(
         &self,
         relief: &Relief<'_>,
         rows: Range<i64>,
         out: &mut [f32],
         work: &dyn Work,
+        progress: &dyn Progress,
     ) -> Result<()> {
         each_block(relief, rows, out, work, |block, scratch, shares| {
+            if progress.cancelled() {
+                return Err(Error::cancelled("sun"));
+            }
             relief.settle(block, scratch)?;
             let mut cosines = std::mem::take(&mut scratch.kept[0]);
             cosines.clear();
