@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use super::eye::Eye;
 use super::missing::distance;
 use super::plan::{HEIGHT_BYTES, LevelPlan, UpdatePlan};
+use super::succession::Successor;
 use super::window::{Scratch, Window, is_damage};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
@@ -54,7 +55,7 @@ impl Faults {
 }
 
 /// Bytes of samples that an update writes at most where no budget is set, but for the first: filling in that much takes
-/// about 2 ms, and what has arrived all at once can wait a frame.
+/// 1 to 2 ms, and what has arrived all at once can wait a frame.
 const FRAME_BYTES: u64 = 768 << 10;
 
 /// Where the eye is, and where it is going.
@@ -116,7 +117,8 @@ impl Arrivals {
     }
 
     /// Reads what is there of what `windows` miss, near ground first, until `budget_bytes` of samples are written, or where
-    /// none are said and there is something to be drawn, [`FRAME_BYTES`]. The coarsest level is beyond any budget: without it nothing can be drawn.
+    /// none are said and there is something to be drawn, [`FRAME_BYTES`]; how much of it is left. The coarsest level is
+    /// beyond any budget: without it nothing can be drawn.
     ///
     /// # Errors
     /// Those of `levels` but for data that are damaged or cannot be read, which stay missing and are noted; there is
@@ -125,12 +127,12 @@ impl Arrivals {
         &mut self,
         levels: &dyn Levels,
         windows: &mut [Window],
-        successors: &mut [Option<Window>],
+        successors: &mut [Option<Successor>],
         plan: &mut UpdatePlan,
         scratch: &mut Scratch,
         course: &Course<'_>,
         budget_bytes: Option<u64>,
-    ) -> Result<()> {
+    ) -> Result<u64> {
         let coarsest = windows.len() as u32 - 1;
         let first = plan.levels().iter().all(|p| p.from.is_empty());
         let mut left_bytes = budget_bytes.unwrap_or(if first { u64::MAX } else { FRAME_BYTES });
@@ -148,7 +150,7 @@ impl Arrivals {
         }
         // Then what is to take the place of what is drawn.
         for written in plan.levels_mut() {
-            let Some(window) = &mut successors[written.level as usize] else {
+            let Some(Successor { window, .. }) = &mut successors[written.level as usize] else {
                 continue;
             };
             let at = course.eye.samples().map(|s| s / (1i64 << written.level) as f64);
@@ -205,11 +207,11 @@ impl Arrivals {
                 Ok(Rect::EMPTY)
             })?;
         }
-        Ok(())
+        Ok(left_bytes)
     }
 
-    /// Reads what is there of the windows that are to take others' places, coarse levels first, and lets one of which all
-    /// is there do so. It is uploaded whole, beyond any budget.
+    /// Reads what is there of the windows that are to take others' places, coarse levels first, and lets those of which all
+    /// is there do so, as far as `left_bytes` of uploads go.
     ///
     /// # Errors
     /// As [`Arrivals::some`].
@@ -217,13 +219,15 @@ impl Arrivals {
         &mut self,
         levels: &dyn Levels,
         windows: &mut [Window],
-        successors: &mut [Option<Window>],
+        successors: &mut [Option<Successor>],
         plan: &mut UpdatePlan,
         scratch: &mut Scratch,
         eye: &Eye,
+        mut left_bytes: u64,
     ) -> Result<()> {
         let faults = &mut self.faults;
-        let mut left_bytes = FRAME_BYTES;
+        // What was read for the windows themselves has taken its time already.
+        let mut left_to_read = FRAME_BYTES.saturating_sub(plan.bytes());
         for written in plan.levels_mut() {
             let level = written.level as usize;
             let Some(successor) = &mut successors[level] else {
@@ -231,13 +235,13 @@ impl Arrivals {
             };
             let mut unseen = LevelPlan::new(written.level);
             let at = eye.samples().map(|s| s / (1i64 << written.level) as f64);
-            each(successor, |window, rect| {
-                let part = affordable(window, rect, at, left_bytes);
+            each(&mut successor.window, |window, rect| {
+                let part = affordable(window, rect, at, left_to_read);
                 if part.is_empty() {
                     return Ok(rect);
                 }
                 match window.fill(levels, part, &mut unseen, scratch, Some(&mut *faults)) {
-                    Ok(Arrival::Arrived) => left_bytes -= bytes(window, part),
+                    Ok(Arrival::Arrived) => left_to_read -= bytes(window, part),
                     Ok(Arrival::Missing) => return Ok(rect),
                     // What cannot be read stays as it was drawn.
                     Err(error) if is_damage(&error) => {
@@ -249,16 +253,8 @@ impl Arrivals {
                 rect.difference(part).for_each(|rest| window.missing.wait(rest));
                 Ok(Rect::EMPTY)
             })?;
-            if successor.missing.is_empty() {
-                let window = &mut windows[level];
-                if let Some(successor) = successors[level].take() {
-                    *window = successor;
-                }
-                written.heights.clear();
-                written.light.clear();
-                written.heights.extend(window.pieces(window.resident()));
-                written.light.extend(window.light_pieces(window.light_resident()));
-                return Ok(());
+            if successor.take_over(&mut windows[level], at, &mut left_bytes, written) {
+                successors[level] = None;
             }
         }
         Ok(())
@@ -292,14 +288,14 @@ fn each(window: &mut Window, mut read: impl FnMut(&mut Window, Rect) -> Result<R
 }
 
 /// The bytes of samples that `rect` writes.
-fn bytes(window: &Window, rect: Rect) -> u64 {
+pub(super) fn bytes(window: &Window, rect: Rect) -> u64 {
     let light = window.light_of(rect);
     rect.area() as u64 * HEIGHT_BYTES + light.area() as u64 * window.light_bytes()
 }
 
 /// The part of `rect` that `limit_bytes` pay for: whole rows where that is one, else a part of a row; from the side
 /// that is nearer to `eye` (in samples of the level).
-fn affordable(window: &Window, rect: Rect, eye: [f64; 2], limit_bytes: u64) -> Rect {
+pub(super) fn affordable(window: &Window, rect: Rect, eye: [f64; 2], limit_bytes: u64) -> Rect {
     if bytes(window, rect) <= limit_bytes {
         return rect;
     }

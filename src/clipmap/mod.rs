@@ -31,6 +31,7 @@ mod scene;
 mod screen;
 mod selection;
 mod stray;
+mod succession;
 mod vertex;
 mod window;
 
@@ -71,6 +72,7 @@ use identity::Identity;
 use need::Dial;
 use occlusion::Slack;
 use range::range_of;
+use succession::Successor;
 use window::Scratch;
 
 /// Seconds of flight for which what windows will gain is wanted beforehand, without waiting.
@@ -94,7 +96,7 @@ pub struct Clipmap {
     range_m: [f32; 2],
     windows: Vec<Window>,
     /// By level: the window that is to take a window's place, where the terrain has something better.
-    successors: Vec<Option<Window>>,
+    successors: Vec<Option<Successor>>,
     edition: u64,
     held: HeldField,
     wait: Wait,
@@ -329,7 +331,7 @@ impl Clipmap {
             let fresh = Window::new(window.level(), &self.grid, &self.ring).with_day(self.has_day);
             match self.wait {
                 Wait::All => *window = fresh,
-                Wait::None => *successor = Some(fresh),
+                Wait::None => *successor = Some(Successor::new(fresh)),
             }
         }
         if self.wait == Wait::All {
@@ -356,11 +358,12 @@ impl Clipmap {
             finest_shown,
         };
         let successors = &mut self.successors;
-        self.arrivals
+        let left_bytes = self
+            .arrivals
             .some(levels, windows, successors, plan, scratch, &course, budget)?;
         if successors.iter().any(Option::is_some) {
             self.arrivals
-                .succeed(levels, windows, successors, plan, scratch, eye)?;
+                .succeed(levels, windows, successors, plan, scratch, eye, left_bytes)?;
             if successors.iter().all(Option::is_none) {
                 self.has_light = levels.has_light();
                 self.range_m = range_of(&windows[windows.len() - 1]).unwrap_or(self.range_m);

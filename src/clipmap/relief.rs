@@ -1,6 +1,7 @@
 //! Light texels: light as it was traced, beside the slopes of the heights, at one level's resolution; and light over a day.
 
 use half::f16;
+use half::slice::HalfFloatSliceExt;
 
 use super::window::{DayTexel, LightTexel, Scratch};
 use crate::error::Result;
@@ -40,31 +41,54 @@ pub(super) fn read(
     }
     let step = (1i64 << level) as f64;
     let spacing_m = grid.spacing_m.map(|s| (s * step) as f32);
-    let heights = &scratch.relief;
-    let at = |i: i64, j: i64| {
-        if around.contains(i, j) {
-            heights[((j - around.z0) * around.width() + (i - around.x0)) as usize]
-        } else {
-            f32::NAN
+    let (width, around_width) = (rect.width() as usize, around.width() as usize);
+    let row =
+        |j: i64| ((j - around.z0) as usize * around_width)..((j + 1 - around.z0) as usize * around_width);
+    let Scratch {
+        relief,
+        shares,
+        texels,
+        rows,
+        ..
+    } = scratch;
+    texels.clear();
+    for (j, shares) in (rect.z0..rect.z1).zip(shares.chunks_exact(width.max(1))) {
+        // A row and its neighbours, one column more on each side than the rectangle has; NaN beyond the level's edges.
+        for (k, padded) in rows.heights.iter_mut().enumerate() {
+            padded.clear();
+            let j = j - 1 + k as i64;
+            if (around.z0..around.z1).contains(&j) {
+                padded.extend((around.x0 == rect.x0).then_some(f32::NAN));
+                padded.extend(&relief[row(j)]);
+            }
+            padded.resize(width + 2, f32::NAN);
         }
-    };
-    scratch.texels.clear();
-    scratch.texels.extend(
-        rect.cells()
-            .zip(&scratch.shares)
-            .map(|((i, j), share)| -> LightTexel {
-                let h = at(i, j);
-                let east = slope(at(i - 1, j), h, at(i + 1, j), spacing_m[0]);
-                let south = slope(at(i, j - 1), h, at(i, j + 1), spacing_m[1]);
-                [share.sun, share.sky, east, south]
-            }),
-    );
+        rows.slopes.clear();
+        let [north, here, south] = &rows.heights;
+        let columns = north[1..].iter().zip(here.windows(3)).zip(&south[1..]);
+        rows.slopes.extend(columns.flat_map(|((north, here), south)| {
+            let east = slope(here[0], here[1], here[2], spacing_m[0]);
+            [east, slope(*north, here[1], *south, spacing_m[1])]
+        }));
+        rows.halves.resize(2 * width, f16::ZERO);
+        rows.halves.convert_from_f32_slice(&rows.slopes);
+        let texel = |(share, slopes): (&LightSample, &[f16])| [share.sun, share.sky, slopes[0], slopes[1]];
+        texels.extend(shares.iter().zip(rows.halves.chunks_exact(2)).map(texel));
+    }
     if day {
         for (texel, sample) in scratch.texels.iter_mut().zip(&scratch.day_samples) {
             texel[0] = rough(level, sample.slope, texel[2], texel[3]);
         }
     }
     Ok(Arrival::Arrived)
+}
+
+/// Rows that are used anew for every row of texels.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rows {
+    heights: [Vec<f32>; 3],
+    slopes: Vec<f32>,
+    halves: Vec<f16>,
 }
 
 /// The light texels of `rect` of level `level`; none where data are missing.
@@ -125,7 +149,7 @@ fn rough(level: u32, slope: f16, east: f16, south: f16) -> f16 {
 
 /// The slope at `here` (rise over run, no unit) from its neighbours: central where both are there, one-sided where
 /// one is, 0 where none is or where there is no height at all.
-fn slope(before: f32, here: f32, after: f32, spacing_m: f32) -> f16 {
+fn slope(before: f32, here: f32, after: f32, spacing_m: f32) -> f32 {
     let (rise, steps) = match (before.is_nan(), here.is_nan(), after.is_nan()) {
         (false, false, false) => (after - before, 2.0),
         (true, false, false) => (after - here, 1.0),
@@ -133,17 +157,81 @@ fn slope(before: f32, here: f32, after: f32, spacing_m: f32) -> f16 {
         _ => (0.0, 1.0),
     };
     // Halves hold up to 65504; a cliff that is steeper than that is as steep.
-    f16::from_f32((rise / (spacing_m * steps)).clamp(-6e4, 6e4))
+    (rise / (spacing_m * steps)).clamp(-6e4, 6e4)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::Grid;
+    use crate::levels::Bounds;
+
+    /// A DEM of a formula with voids, without light.
+    struct Rough(Grid);
+
+    fn height(i: i64, j: i64) -> f32 {
+        let void = (i * 7 + j * 13) % 11 == 0;
+        if void {
+            f32::NAN
+        } else {
+            ((i * i + 3 * j) % 17) as f32
+        }
+    }
+
+    impl Levels for Rough {
+        fn grid(&self) -> &Grid {
+            &self.0
+        }
+        fn heights(&self, _: u32, rect: Rect, out: &mut [f32]) -> Result<Arrival> {
+            rect.cells()
+                .zip(out)
+                .for_each(|((i, j), out)| *out = height(i, j));
+            Ok(Arrival::Arrived)
+        }
+        fn bounds(&self, _: u32, _: Rect, _: &mut [Bounds]) -> Result<Arrival> {
+            Ok(Arrival::Missing)
+        }
+        fn has_light(&self) -> bool {
+            false
+        }
+        fn light(&self, _: u32, _: Rect, _: &mut [LightSample]) -> Result<Arrival> {
+            Ok(Arrival::Missing)
+        }
+    }
+
+    #[test]
+    fn texels_by_rows_are_those_of_each_sample_alone() {
+        let rough = Rough(Grid::new(40, 30, [10.0, 20.0]));
+        let inside = rough.0.size.rect();
+        for rect in [
+            inside,
+            Rect::new(3, 4, 20, 29),
+            Rect::new(0, 7, 1, 8),
+            Rect::new(39, 29, 40, 30),
+            Rect::new(39, 0, 40, 30),
+        ] {
+            let texels = light_texels(&rough, 0, rect).unwrap().unwrap();
+            assert_eq!(texels.len() as i64, rect.area());
+            for ((i, j), texel) in rect.cells().zip(texels) {
+                let at = |i, j| {
+                    if inside.contains(i, j) {
+                        height(i, j)
+                    } else {
+                        f32::NAN
+                    }
+                };
+                let east = slope(at(i - 1, j), at(i, j), at(i + 1, j), 10.0);
+                let south = slope(at(i, j - 1), at(i, j), at(i, j + 1), 20.0);
+                let want = [f16::ZERO, f16::ZERO, f16::from_f32(east), f16::from_f32(south)];
+                assert_eq!(texel, want, "({i}, {j}) of {rect:?}");
+            }
+        }
+    }
 
     #[test]
     fn slopes_are_central_one_sided_or_flat() {
         let nan = f32::NAN;
-        let of = |b, h, a| slope(b, h, a, 10.0).to_f32();
+        let of = |b, h, a| slope(b, h, a, 10.0);
         assert_eq!(of(0.0, 7.0, 40.0), 2.0);
         assert_eq!(of(nan, 0.0, 10.0), 1.0);
         assert_eq!(of(0.0, 10.0, nan), 1.0);

@@ -1,5 +1,7 @@
 //! A level's window: which samples are resident, and their mirror on the CPU, from which the GPU is fed.
 
+mod take_over;
+
 use half::f16;
 
 use super::arrivals::Faults;
@@ -445,6 +447,7 @@ pub(super) struct Scratch {
     pub(super) texels: Vec<LightTexel>,
     pub(super) day_samples: Vec<DaySample>,
     pub(super) days: Vec<DayTexel>,
+    pub(super) rows: relief::Rows,
 }
 
 /// Copies a rectangle's rows into the rows of a square of `n` slots, from its first slot on.

@@ -91,6 +91,20 @@ impl Synth {
         }
     }
 
+    /// The same, rows shared out to all processors where they are many.
+    fn fill_shared(&self, level: u32, rect: Rect, out: &mut [f32]) {
+        if rect.is_empty() {
+            return;
+        }
+        let task_rows = TASK_SAMPLES / rect.width() + 1;
+        let task_samples = (rect.width() * task_rows) as usize;
+        each_chunk(&Processors, out, task_samples, |n, rows| {
+            let z0 = rect.z0 + n as i64 * task_rows;
+            let z1 = (z0 + task_rows).min(rect.z1);
+            self.fill(level, Rect::new(rect.x0, z0, rect.x1, z1), rows);
+        });
+    }
+
     /// Bounds of a row of patches `a0..a1`, `b` of `level`.
     fn row_bounds(&self, level: u32, [a0, a1]: [i64; 2], b: i64, out: &mut [Bounds]) {
         let rect = Rect::new(a0 * PATCH, b * PATCH, a1 * PATCH + 1, (b + 1) * PATCH + 1);
@@ -187,22 +201,9 @@ impl HeightSource for Synth {
         &self.description
     }
 
-    /// Rows are shared out to all processors where they are many.
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {
         self.check(0, rect, self.size(0), out.len())?;
-        if !rect.is_empty() {
-            let task_rows = TASK_SAMPLES / rect.width() + 1;
-            each_chunk(
-                &Processors,
-                out,
-                (rect.width() * task_rows) as usize,
-                |n, rows| {
-                    let z0 = rect.z0 + n as i64 * task_rows;
-                    let z1 = (z0 + task_rows).min(rect.z1);
-                    self.fill(0, Rect::new(rect.x0, z0, rect.x1, z1), rows);
-                },
-            );
-        }
+        self.fill_shared(0, rect, out);
         Ok(())
     }
 }
@@ -214,16 +215,17 @@ impl Levels for Synth {
 
     fn heights(&self, level: u32, rect: Rect, out: &mut [f32]) -> Result<Arrival> {
         self.check(level, rect, self.size(level), out.len())?;
-        self.fill(level, rect, out);
+        self.fill_shared(level, rect, out);
         Ok(Arrival::Arrived)
     }
 
     fn bounds(&self, level: u32, patches: Rect, out: &mut [Bounds]) -> Result<Arrival> {
         self.check(level, patches, self.size(level).patches(), out.len())?;
         if !patches.is_empty() {
-            for (b, row) in (patches.z0..patches.z1).zip(out.chunks_exact_mut(patches.width() as usize)) {
+            each_chunk(&Processors, out, patches.width() as usize, |n, row| {
+                let b = patches.z0 + n as i64;
                 self.row_bounds(level, [patches.x0, patches.x1], b, row);
-            }
+            });
         }
         Ok(Arrival::Arrived)
     }

@@ -13,6 +13,7 @@ pub mod depths;
 pub mod facts;
 pub mod flights;
 pub mod motion;
+pub mod places;
 pub mod scenes;
 
 /// Levels whose every sample is a function of level, column and row; NaN for no data.
