@@ -13,7 +13,7 @@ use super::view_values::ClipSize;
 use super::{Failure, Outcome};
 use crate::build::{Output, refuse_existing};
 use crate::camera::{Flight, MAX_EYE_M, check_picture, overview};
-use crate::clipmap::{ClipmapOptions, Wait, fit_clip_size, height_range_m};
+use crate::clipmap::{AHEAD_S, ClipmapOptions, FRAME_BYTES, Wait, fit_clip_size, height_range_m};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu;
 use crate::grid::Grid;
@@ -111,6 +111,9 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     if args.measure {
         headless.measure()?;
     }
+    if args.view.stats.is_some() || args.view.max_error_px.is_some() {
+        headless.certify();
+    }
     let frames = match &shots {
         Shots::Flight(flight) => recording.record(&mut headless, levels, flight, terminal)?,
         Shots::Still(camera) => {
@@ -200,8 +203,9 @@ fn fastest_fresh_m_s(
     let flown = Flown {
         clip_size: clipmap.clip_size,
         levels: headless.clipmap().windows().len() as u32,
-        upload_budget_bytes: clipmap.upload_budget_bytes,
+        upload_budget_bytes: clipmap.upload_budget_bytes.or(Some(FRAME_BYTES)),
         fps: flight.fps(),
+        ahead_s: AHEAD_S,
     };
     terrain.pace().map(|pace| pace.fastest_m_s(&flown))
 }

@@ -56,7 +56,7 @@ impl Faults {
 
 /// Bytes of samples that an update writes at most where no budget is set, but for the first: filling in that much takes
 /// 1 to 2 ms, and what has arrived all at once can wait a frame.
-const FRAME_BYTES: u64 = 768 << 10;
+pub const FRAME_BYTES: u64 = 768 << 10;
 
 /// Where the eye is, and where it is going.
 #[derive(Clone, Copy, Debug)]

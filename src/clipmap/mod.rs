@@ -35,7 +35,7 @@ mod succession;
 mod vertex;
 mod window;
 
-pub use arrivals::Wait;
+pub use arrivals::{FRAME_BYTES, Wait};
 pub use certificate::{
     Certificate, CertifiedPatch, Terms, Uncertified, certified_patches, certify, certify_by,
 };
@@ -76,7 +76,7 @@ use succession::Successor;
 use window::Scratch;
 
 /// Seconds of flight for which what windows will gain is wanted beforehand, without waiting.
-const AHEAD_S: f64 = 1.0;
+pub const AHEAD_S: f64 = 1.0;
 
 /// The clipmap of one view.
 #[derive(Clone, Debug)]

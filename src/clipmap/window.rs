@@ -445,9 +445,9 @@ pub(super) struct Scratch {
     pub(super) relief: Vec<f32>,
     pub(super) shares: Vec<crate::levels::LightSample>,
     pub(super) texels: Vec<LightTexel>,
+    pub(super) rows: relief::Rows,
     pub(super) day_samples: Vec<DaySample>,
     pub(super) days: Vec<DayTexel>,
-    pub(super) rows: relief::Rows,
 }
 
 /// Copies a rectangle's rows into the rows of a square of `n` slots, from its first slot on.

@@ -47,15 +47,15 @@ pub struct Frame {
     pub rgba8: Vec<u8>,
     /// What the update did.
     pub update: UpdateReport,
-    /// What is certified of its error.
-    pub certificate: Certificate,
+    /// What is certified of its error, where that is asked for, see [`Headless::certify`].
+    pub certificate: Option<Certificate>,
     /// What was uploaded.
     pub upload: UploadReport,
     /// What was drawn.
     pub draw: DrawReport,
     /// Moving the windows (what is newly exposed is read) and selecting patches, in wall milliseconds.
     pub plan_ms: f64,
-    /// Finding the certificate.
+    /// Finding the certificate; 0 without one.
     pub certify_ms: f64,
     /// Writing the uploads into mapped memory and recording their copies, which are part of the draw.
     pub upload_ms: f64,
@@ -79,6 +79,7 @@ pub struct Headless {
     textures: ViewTextures,
     targets: Targets,
     timer: Option<Timer>,
+    certifies: bool,
     measuring: Option<MeasuringPass>,
     pool: Option<ErrorPool>,
     truth: Option<Arc<dyn Levels>>,
@@ -127,6 +128,7 @@ impl Headless {
             sky: SkyRenderer::new(&gpu.device, &renderer_options)?,
             targets: Targets::new(&gpu.device, options, &renderer_options),
             timer: gpu.has_timestamps().then(|| Timer::new(&gpu)),
+            certifies: false,
             // The errors that this view shows are measured.
             measuring: (options.view_mode == ViewMode::Error)
                 .then(|| MeasuringPass::new(&gpu, options))
@@ -167,7 +169,7 @@ impl Headless {
         let update = *self.clipmap.update(levels, view, time_s)?;
         self.follow_light()?;
         let planned = Instant::now();
-        let certificate = certify(&self.clipmap)?;
+        let certificate = self.certifies.then(|| certify(&self.clipmap)).transpose()?;
         let certified = Instant::now();
         let mut encoder = self
             .gpu
@@ -251,6 +253,11 @@ impl Headless {
     /// What frames are measured against, where that is not the levels that they are drawn from: those do not wait.
     pub fn set_truth(&mut self, truth: Arc<dyn Levels>) {
         self.truth = Some(truth);
+    }
+
+    /// Certifies every frame from now on: [`Frame::certificate`].
+    pub fn certify(&mut self) {
+        self.certifies = true;
     }
 
     /// Measures every frame from now on: [`Frame::measured`], from a second pass where there are several samples a pixel.

@@ -208,9 +208,12 @@ fn frame_stats(frame: &Frame, headless: &Headless, k: u64, t_s: f64, camera: &Ca
         cracks: frame.measured.as_ref().map(|m| m.cracks),
         beside_px: errors.map(|e| e.beside_px),
         silhouette_px: errors.map(|e| e.silhouette_px),
-        certified_error_px: frame.certificate.error_px.ok(),
-        certificate_reason: frame.certificate.error_px.err().map(|u| u.reason().to_string()),
+        certified_error_px: frame.certificate.and_then(|c| c.error_px.ok()),
+        certificate_reason: frame
+            .certificate
+            .and_then(|c| c.error_px.err())
+            .map(|u| u.reason().to_string()),
         max_error_px,
-        keeps_max_error: max_error_px.map(|px| frame.certificate.keeps(px)),
+        keeps_max_error: max_error_px.and_then(|px| frame.certificate.map(|c| c.keeps(px))),
     }
 }
