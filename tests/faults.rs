@@ -30,7 +30,6 @@ const OPTIONS: ClipmapOptions = ClipmapOptions {
     max_error_px: None,
     wait: Wait::None,
     upload_budget_bytes: None,
-    day: false,
 };
 
 /// Bytes that can be damaged while they are read.
