@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use half::f16;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
 
 /// Bounds of one patch of a level, rounded outwards.
@@ -55,6 +55,25 @@ pub struct LightSample {
     pub sky: f16,
 }
 
+/// Light over a day at a sample. Times are of [`crate::light::Day`]: 0 at the sun's noon, -1 and 1 at the day's ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct DaySample {
+    /// When the middle of the sun's disc first stands over the horizon, in the mean of the ground of the sample.
+    pub first: f16,
+    /// How long before and after `first` some of the disc stands over it, or some of the ground is lit: see
+    /// [`crate::light::sun_of_day`].
+    pub first_soft: f16,
+    /// When it last does; as `first` where it never does.
+    pub last: f16,
+    /// The same about `last`.
+    pub last_soft: f16,
+    /// Root of the mean squared slope of level 0 under the sample, rise over run.
+    pub slope: f16,
+    /// Fills the struct to whole words; 0.
+    pub unused: f16,
+}
+
 /// Whether what was asked for is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
@@ -74,6 +93,8 @@ pub enum Data {
     Bounds,
     /// [`Levels::light`].
     Light,
+    /// [`Levels::day`].
+    Day,
 }
 
 /// What will be asked for.
@@ -120,6 +141,24 @@ pub trait Levels: Send + Sync {
     /// # Errors
     /// Where the data are damaged or cannot be read, or there is no light.
     fn light(&self, level: u32, rect: Rect, out: &mut [LightSample]) -> Result<Arrival>;
+
+    /// Whether there is light over a day. Without it [`Levels::day`] must not be called.
+    fn has_day(&self) -> bool {
+        false
+    }
+
+    /// The light over a day of `rect` of level `level`.
+    ///
+    /// # Errors
+    /// Where the data are damaged or cannot be read, or there is no day.
+    fn day(&self, level: u32, rect: Rect, out: &mut [DaySample]) -> Result<Arrival> {
+        let _ = (level, rect, out);
+        Err(Error::new(
+            ErrorKind::Misuse,
+            "terrain",
+            "it has no light over a day",
+        ))
+    }
 
     /// Hears what will soon be asked for, most urgent first, in place of what it was told before: what is not among it is
     /// no longer wanted. A source that reads at once ignores it.

@@ -14,7 +14,7 @@ use glam::Vec3;
 
 use crate::clipmap::{LEVEL_SLOTS, LIGHT_TEXEL_STEPS, VOID_HEIGHT};
 use crate::grid::PATCH;
-use crate::light::Sun;
+use crate::light::{DISC_DEG, Sun, disc_coefficients};
 
 /// What a frame shows: for each of these a function `view_NAME` in `shaders/shared/views.wgsl`, and a name below.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -53,7 +53,7 @@ impl ViewMode {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct ShadeConstants {
-    /// Unit vector to the sun: east, up, south; the fourth is unused.
+    /// Unit vector to the sun: east, up, south; the fourth is 0 once its disc has set, else 1.
     pub to_sun: [f32; 4],
     /// Least height of the DEM in metres above its base: where the ground's tint begins.
     pub low_m: f32,
@@ -69,17 +69,18 @@ pub struct ShadeConstants {
     pub eye_haze: f32,
     /// Density of the air at the eye, 1 at the lowest ground and below it.
     pub eye_density: f32,
-    /// Fills the struct to a multiple of 16 bytes.
-    pub unused: f32,
+    /// The time of day, of [`crate::light::Day`]; 0 where light is not of a day.
+    pub day_time: f32,
 }
 
 impl ShadeConstants {
     /// The constants for a DEM with heights in `range_m` above `base_m`, seen from `eye_height_m` above `base_m`.
     pub fn new(sun: &Sun, range_m: [f32; 2], base_m: f64, vertical_scale: f64, eye_height_m: f32) -> Self {
         let [x, y, z] = sun.direction();
+        let up = sun.altitude_deg > -DISC_DEG / 2.0;
         let eye_haze = (eye_height_m - range_m[0]) * vertical_scale as f32 * (1.0 / HAZE_SCALE_M);
         Self {
-            to_sun: [x as f32, y as f32, z as f32, 0.0],
+            to_sun: [x as f32, y as f32, z as f32, f32::from(u8::from(up))],
             low_m: range_m[0],
             high_m: range_m[1],
             base_m: base_m as f32,
@@ -87,7 +88,7 @@ impl ShadeConstants {
             per_relief: 1.0 / (range_m[1] - range_m[0]).max(RELIEF_LEAST_M),
             eye_haze,
             eye_density: (-eye_haze.clamp(0.0, 80.0)).exp(),
-            unused: 0.0,
+            day_time: 0.0,
         }
     }
 }
@@ -168,6 +169,7 @@ pub fn wgsl_constants() -> String {
     ] {
         line(name, float(value));
     }
+    line("DISC", vector(Vec3::from_array(disc_coefficients())));
     for (name, value) in [
         ("SUN_LIGHT", SUN_LIGHT),
         ("SKY_LIGHT", SKY_LIGHT),

@@ -28,6 +28,7 @@ const OPTIONS: ClipmapOptions = ClipmapOptions {
     max_error_px: None,
     wait: Wait::None,
     upload_budget_bytes: None,
+    day: false,
 };
 
 /// Keeps what is said.

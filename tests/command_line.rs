@@ -243,7 +243,7 @@ fn info_says_what_a_terrain_file_is_and_verify_finds_what_is_damaged() {
             .unwrap_or_else(|| panic!("no {name} in {json}"))
     };
     let documented = "format type width height spacing min max voids vertical_unit vertical_datum crs unit pixel origin \
-        extent registration levels light assumed noticed";
+        extent registration levels light day assumed noticed";
     let places: Vec<usize> = documented.split_whitespace().map(at).collect();
     assert!(places.is_sorted(), "{json}");
     assert_eq!(info.as_object().unwrap().len(), places.len(), "{json}");
@@ -665,4 +665,123 @@ fn the_whole_dem_is_in_the_picture_at_any_vertical_scale() {
         "{}",
         ran.err
     );
+}
+
+#[test]
+fn a_day_is_traced_told_and_asked_for_by_its_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let make = |output, more: &[&str]| {
+        let common = [
+            "preprocess",
+            "synth:300",
+            "-o",
+            output,
+            "--sky-directions",
+            "0",
+            "--lat",
+            "42",
+            "--lon",
+            "1.5",
+        ];
+        run(here, &[&common[..], more].concat())
+    };
+    let at = ["--sun-at", "2026-06-21T09:00Z"];
+    let made = make("a.exr", &[&at[..], &["--day", "8"]].concat());
+    assert_eq!(made.status, 0, "{}", made.err);
+    assert!(made.err.contains("the day runs from 4:"), "{}", made.err);
+    assert_eq!(make("b.exr", &at).status, 0);
+    let info = |name: &str| -> serde_json::Value {
+        serde_json::from_str(&done(here, &["info", name, "--json", "--verify", "--quiet"])).unwrap()
+    };
+    let day = &info("a.exr")["day"];
+    assert_eq!(day["positions"], 8, "{day}");
+    assert!(
+        day["noon"].as_str().unwrap().starts_with("2026-06-21T11:5"),
+        "{day}"
+    );
+    assert!(info("b.exr")["day"].is_null());
+    assert!(done(here, &["info", "a.exr"]).contains("by the sun, noon at 2026-06-21T11:5"));
+    assert_eq!(make("c.exr", &["--day", "8"]).status, 2, "a day has a date");
+    for wrong in ["1", "5000", "-3"] {
+        assert_eq!(
+            make("c.exr", &[&at[..], &["--day", wrong]].concat()).status,
+            2,
+            "{wrong}"
+        );
+    }
+    let night = make(
+        "c.exr",
+        &[
+            "--sun-at",
+            "2026-12-21T09:00Z",
+            "--day",
+            "8",
+            "--lat",
+            "80",
+            "--lon",
+            "1",
+        ],
+    );
+    assert_eq!(night.status, 2, "--lat twice: {}", night.err);
+    let dark = [
+        "preprocess",
+        "synth:32",
+        "-o",
+        "c.exr",
+        "--lat",
+        "80",
+        "--lon",
+        "1",
+    ];
+    let dark = [&dark[..], &["--sun-at", "2026-12-21T09:00Z", "--day", "8"]].concat();
+    fails(here, 1, &dark, &["does not rise", "another date"]);
+    assert_eq!(names(here), ["a.exr", "b.exr"]);
+
+    #[cfg(feature = "gpu")]
+    if clipscape::gpu::open().is_ok() {
+        let render = |input, output, more: &[&str]| {
+            run(
+                here,
+                &[
+                    &["render", input, "-o", output, "--size", "64x48", "--quiet"][..],
+                    more,
+                ]
+                .concat(),
+            )
+        };
+        for (output, time) in [
+            ("m.png", "7:00"),
+            ("n.png", "12:00"),
+            ("o.png", "2026-06-21T11:55:00Z"),
+        ] {
+            let ran = render("a.exr", output, &["--sun-time", time]);
+            assert_eq!((ran.status, ran.err.as_str()), (0, ""), "{time}");
+        }
+        let picture = |name: &str| fs::read(here.join(name)).unwrap();
+        assert_ne!(picture("m.png"), picture("n.png"), "the morning looks otherwise");
+        let ran = render("b.exr", "p.png", &["--sun-time", "7:00"]);
+        assert!(
+            ran.status == 1 && ran.err.contains("preprocess --sun-at TIME --day N"),
+            "{}",
+            ran.err
+        );
+        assert_eq!(render("a.exr", "p.png", &["--sun-time", "25:00"]).status, 2);
+        let keys = r#"{"t": 0, "eye": [100, 5000, 100], "heading": 90, "pitch": -60, "sun_time": HOUR}"#;
+        let flight = |hour: &str| format!(r#"{{"keys": [{}]}}"#, keys.replace("HOUR", hour));
+        fs::write(here.join("f.json"), flight("8.5")).unwrap();
+        assert_eq!(render("a.exr", "f", &["--flight", "f.json"]).status, 0);
+        let none = render("b.exr", "g", &["--flight", "f.json"]);
+        assert!(
+            none.status == 1 && none.err.contains("sun_time in the flight"),
+            "{}",
+            none.err
+        );
+        let both = render("a.exr", "g", &["--flight", "f.json", "--sun-time", "9:00"]);
+        assert!(
+            both.status == 1 && both.err.contains("leave one of them out"),
+            "{}",
+            both.err
+        );
+    }
 }

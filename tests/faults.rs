@@ -26,9 +26,11 @@ const OPTIONS: ClipmapOptions = ClipmapOptions {
     vertical_scale: 1.0,
     cull: false,
     occlusion: true,
+    day: false,
     max_error_px: None,
     wait: Wait::None,
     upload_budget_bytes: None,
+    day: false,
 };
 
 /// Bytes that can be damaged while they are read.

@@ -10,10 +10,12 @@ use std::path::{Path, PathBuf};
 
 use clipscape::build::Threads;
 use clipscape::grid::{Grid, Rect};
-use clipscape::light::{DISC_DEG, Sun, disc_share, sun_share};
+use clipscape::light::{DISC_DEG, Earth, Sun, disc_share, sun_share};
 use clipscape::progress::Silent;
+use clipscape::pyramid::{Filter, Pyramid};
+use clipscape::query::{S0, lit_at};
 use clipscape::source::{self, OpenOptions};
-use clipscape::work::each_chunk;
+use clipscape::work::{Serial, each_chunk};
 use support::{Random, seed};
 
 /// A DEM, its heights row by row.
@@ -60,8 +62,8 @@ impl Dem {
         (1.0 - weight) * self.at(i, j) + weight * self.at(i1, j1)
     }
 
-    /// The tangent of the horizon over sample (i, j), at least 0.
-    fn tangent(&self, azimuth_deg: f64, highest: f64, i: i64, j: i64) -> f64 {
+    /// The tangent of the horizon over sample (i, j), seen from `above_m` over it, at least 0.
+    fn tangent(&self, azimuth_deg: f64, highest: f64, [i, j]: [i64; 2], above_m: f64) -> f64 {
         let (sin, cos) = azimuth_deg.to_radians().sin_cos();
         let clean = |x: f64| if x.abs() < 1e-15 { 0.0 } else { x };
         let mut rate = [
@@ -71,7 +73,7 @@ impl Dem {
         if (rate[0].abs() - rate[1].abs()).abs() < 1e-12 * rate[0].abs() {
             rate[1] = rate[0].abs().copysign(rate[1]);
         }
-        let here = self.at(i, j);
+        let here = self.at(i, j) + above_m;
         let mut best = 0.0f64;
         for (kind, rate_of) in [rate[0], rate[1], rate[0] - rate[1]].into_iter().enumerate() {
             if rate_of == 0.0 {
@@ -138,7 +140,7 @@ impl Dem {
             for (i, out) in (0..).zip(row) {
                 let j = j as i64;
                 if !self.at(i, j).is_nan() {
-                    let tangent = self.tangent(sun.azimuth_deg, highest, i, j);
+                    let tangent = self.tangent(sun.azimuth_deg, highest, [i, j], 0.0);
                     *out = [
                         disc_share(tangent.atan(), sun.altitude_deg.to_radians()),
                         self.cosine(sun, i, j),
@@ -345,4 +347,91 @@ fn real_mountains_are_lit_as_the_caster_lights_them() {
             );
         }
     }
+}
+
+/// Points on the ground and in the air over it see of the sun what the caster says.
+#[test]
+fn points_in_the_air_are_lit_as_the_caster_lights_them() {
+    let mut random = Random(seed(15));
+    let (mut dark, mut partly, mut lit, mut off) = (0, 0, 0, 0);
+    for (width, height, spacing_m) in [(90, 70, [30.0, 30.0]), (83, 101, [25.0, 40.0])] {
+        let mut dem = rough(width, height, spacing_m, &mut random);
+        // Behind a hole a ray may come out under the ground, which the caster never asks.
+        dem.heights
+            .iter_mut()
+            .filter(|h| h.is_nan())
+            .for_each(|h| *h = 0.0);
+        let highest = dem
+            .heights
+            .iter()
+            .fold(f64::NEG_INFINITY, |m, &h| m.max(h.into()));
+        let mut levels = Pyramid::new(
+            dem.grid,
+            dem.heights.clone(),
+            None,
+            &Filter::default(),
+            &Serial,
+            &Silent,
+        )
+        .unwrap();
+        levels.bound(&Serial, &Silent).unwrap();
+        let ground = S0::new(&levels);
+        let earth = Earth::default();
+        for _ in 0..4000 {
+            let sun = sun(
+                random.uniform(0.0, 360.0),
+                random.pick(&[-0.2, 0.1, 3.0, 8.0, 20.0, 45.0]),
+            );
+            let [i, j] = [width, height].map(|n: i64| random.uniform(0.0, n as f64) as i64);
+            let above_m = random.pick(&[0.0, 0.0, 1.0, 10.0, 50.0]) * random.uniform(0.5, 1.0);
+            let (x, z) = (i as f64 * spacing_m[0], j as f64 * spacing_m[1]);
+            let y = dem.at(i, j) + above_m;
+            let got = lit_at(&ground, &earth, sun, [x, y, z])
+                .unwrap()
+                .expect("it is not below the ground");
+            let tangent = dem.tangent(sun.azimuth_deg, highest, [i, j], above_m);
+            let want = disc_share(tangent.atan(), sun.altitude_deg.to_radians());
+            assert!(
+                (got - want).abs() < 1e-3,
+                "({i}, {j}), {above_m} m up, {sun:?}, seed {}: {got}, not {want}",
+                seed(15)
+            );
+            dark += u32::from(want == 0.0);
+            lit += u32::from(want == 1.0);
+            partly += u32::from(want > 0.0 && want < 1.0);
+            // A control: the sun of a degree further round, and up, shows.
+            let other = Sun {
+                altitude_deg: sun.altitude_deg + 0.3,
+                ..sun
+            };
+            off +=
+                u32::from((lit_at(&ground, &earth, other, [x, y, z]).unwrap().unwrap() - want).abs() > 0.1);
+            // Higher up it never gets darker, and under the ground is no light to speak of.
+            let higher = lit_at(&ground, &earth, sun, [x, y + random.uniform(0.0, 30.0), z]).unwrap();
+            assert!(higher.unwrap() >= got - 1e-4, "({i}, {j}), {sun:?}");
+            let below = lit_at(&ground, &earth, sun, [x, dem.at(i, j) - 1.0, z]).unwrap();
+            assert_eq!(below, None);
+        }
+        // Far up, and beyond the DEM, nothing stands before the sun.
+        for at in [[100.0, 1e4, 100.0], [-1e5, 0.0, 50.0]] {
+            assert_eq!(lit_at(&ground, &earth, sun(270.0, 10.0), at).unwrap(), Some(1.0));
+        }
+        let turned = Earth {
+            grid_north_deg: 30.0,
+            ..earth
+        };
+        let at = [x_of(40, spacing_m), dem.at(40, 40), 40.0 * spacing_m[1]];
+        assert_eq!(
+            lit_at(&ground, &turned, sun(100.0, 5.0), at).unwrap(),
+            lit_at(&ground, &earth, sun(70.0, 5.0), at).unwrap()
+        );
+        assert!(lit_at(&ground, &earth, sun(f64::NAN, 5.0), at).is_err());
+        assert!(lit_at(&ground, &earth, sun(0.0, 5.0), [f64::NAN, 0.0, 0.0]).is_err());
+    }
+    eprintln!("{dark} dark, {partly} partly lit, {lit} lit; the control differs at {off}");
+    assert!(dark > 1000 && partly > 100 && lit > 1000 && off > 300);
+}
+
+fn x_of(i: i64, spacing_m: [f64; 2]) -> f64 {
+    i as f64 * spacing_m[0]
 }

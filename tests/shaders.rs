@@ -180,7 +180,7 @@ fn mirrored_structs_have_the_layout_that_shaders_read() {
         per_relief,
         eye_haze,
         eye_density,
-        unused
+        day_time
     });
     assert_eq!(ours, layout(&terrain, "ShadeConstants"));
 }

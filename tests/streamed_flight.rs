@@ -240,7 +240,7 @@ fn while_data_arrive_nothing_cracks_or_pops() {
     };
     assert_whole("the flight", &flight, &fly(&scene, &flight));
     let late = Flight {
-        slow: Duration::from_millis(4),
+        slow: Duration::from_millis(12),
         pace: Duration::ZERO,
         ..flight
     };
@@ -250,6 +250,7 @@ fn while_data_arrive_nothing_cracks_or_pops() {
     // Control: what arrives is there at once, as if a second passed from frame to frame.
     let hasty = Flight {
         frames: 60,
+        slow: Duration::from_millis(2),
         passed_s: 1.0,
         ..late
     };

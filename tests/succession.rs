@@ -105,9 +105,12 @@ fn samples(clipmap: &Clipmap, editions: &Editions) -> [usize; 2] {
     counts
 }
 
+/// Heights, light, bounds.
+type Contents = (Vec<u32>, Vec<[u16; 4]>, Vec<String>);
+
 /// What a window holds, as bits: heights, light, and the bounds of each patch. Whether one has voids may be said in vain of
 /// samples that have left the window.
-fn contents(clipmap: &Clipmap) -> Vec<(Vec<u32>, Vec<[u16; 4]>, Vec<String>)> {
+fn contents(clipmap: &Clipmap) -> Vec<Contents> {
     let of = |window: &clipscape::clipmap::Window| {
         let heights = window
             .resident()

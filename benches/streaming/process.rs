@@ -31,17 +31,10 @@ pub(crate) fn forget(_: &Path) -> bool {
     false
 }
 
-/// Resident memory of this process, now and at most since [`forget_peak`], in bytes; none where the system does not tell.
-pub(crate) fn resident_bytes() -> Option<[u64; 2]> {
+/// Memory that this process holds, files that it maps left out, in bytes; none where the system does not tell.
+pub(crate) fn held_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let field = |name: &str| -> Option<u64> {
-        let line = status.lines().find(|l| l.starts_with(name))?;
-        Some(1024 * line.split_whitespace().nth(1)?.parse::<u64>().ok()?)
-    };
-    Some([field("VmRSS:")?, field("VmHWM:")?])
-}
-
-/// Begins to look for the most resident memory anew, where the system allows that.
-pub(crate) fn forget_peak() {
-    let _ = std::fs::write("/proc/self/clear_refs", "5");
+    let line = status.lines().find(|l| l.starts_with("RssAnon:"))?;
+    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(1024 * kib)
 }

@@ -1,7 +1,7 @@
 //! The frame time over a terrain of 2^20 x 2^20 samples against that over one of 4096 x 4096, frames in turn.
 //!
 //! All draw the same levels. With those whose windows lie within the smaller terrain (five at clip size 256) a view from
-//! its middle shows no edge of it, so the middle 4096 x 4096 samples of the larger one, taken for a terrain of their own,
+//! its middle shows no edge of it, so the middle 4097 x 4097 samples of the larger one, taken for a terrain of their own,
 //! are drawn as the larger one is, bit for bit but for colours, which follow from all heights: their ratio is what size
 //! costs. `synth:4096:1` has other ground there. With all levels that the smaller one has, six, the window of the coarsest
 //! is larger than it, and the larger terrain shows more ground by more triangles.
@@ -27,7 +27,7 @@ const CLIP_SIZE: i64 = 256;
 /// Frames of a round: once around the middle.
 const FRAMES: u32 = 30;
 
-/// The middle of the larger terrain as one of its own.
+/// The middle of the larger terrain as one of its own, a sample larger: its edge lies on a sample of every level.
 struct Middle {
     grid: Grid,
     whole: Synth,
@@ -37,7 +37,7 @@ impl Middle {
     fn new(whole: Synth) -> Self {
         let spacing_m = Levels::grid(&whole).spacing_m;
         Self {
-            grid: Grid::new(SMALL, SMALL, spacing_m),
+            grid: Grid::new(SMALL + 1, SMALL + 1, spacing_m),
             whole,
         }
     }
@@ -102,7 +102,7 @@ pub(crate) fn size(rounds: u32) -> Result<()> {
     let terrains: [(&str, Box<dyn Levels>); 3] = [
         ("synth:4096:1", Box::new(Synth::new(SMALL, 1)?)),
         (
-            "the middle 4096 of synth:1048576:1",
+            "the middle 4097 of synth:1048576:1",
             Box::new(Middle::new(large.clone())),
         ),
         ("synth:1048576:1", Box::new(large)),

@@ -5,6 +5,7 @@
 #import surface function
 
 override TRACED_LIGHT: bool = true;     // whether light texels hold traced light; else it follows from slopes
+override DAY: bool = false;             // whether light is of a day: its texels stand in the layers after those of light
 override TINT: bool = true;             // whether the look tints the ground by height and slope
 override HAZE: bool = true;             // whether the look lays air between ground and eye
 override ENCODE_SRGB: bool = false;     // whether the target's format leaves sRGB encoding to the shader
@@ -23,10 +24,51 @@ struct GroundPoint {
 // The light texel over a point, bilinear. Slots repeat, so the sampler's repetition is the torus. The place from the eye
 // is taken in steps of a texel that add to a slot without rounding, so that it does not matter where the slots begin.
 fn light_at(level: u32, from_eye: vec2<f32>) -> vec4<f32> {
+    return textureSampleLevel(light, light_sampler, light_place(level, from_eye), level, 0.0);
+}
+
+fn light_place(level: u32, from_eye: vec2<f32>) -> vec2<f32> {
     let constants = levels[level];
     let place = round(from_eye * (constants.light_scale * LIGHT_TEXEL_STEPS)) * (1.0 / LIGHT_TEXEL_STEPS);
     let texel = constants.light_at_eye + place + 0.5;
-    return textureSampleLevel(light, light_sampler, texel * (0.5 / f32(view.slot_mask + 1)), level, 0.0);
+    return texel * (0.5 / f32(view.slot_mask + 1));
+}
+
+// The texel of light over a day there: first light, its softness, last light, its softness.
+fn day_at(level: u32, from_eye: vec2<f32>) -> vec4<f32> {
+    let layer = textureNumLayers(light) / 2u + level;
+    return textureSampleLevel(light, light_sampler, light_place(level, from_eye), layer, 0.0);
+}
+
+// The share of a disc on one side of a line at distance x of its radius from its middle.
+fn disc(x: f32) -> f32 {
+    let c = clamp(x, -1.0, 1.0);
+    let square = c * c;
+    return 0.5 + c * (DISC.x + square * (DISC.y + square * DISC.z));
+}
+
+// The integral of `disc` from -1 to x.
+fn disc_integral(x: f32) -> f32 {
+    let c = clamp(x, -1.0, 1.0);
+    let square = c * c;
+    let least = 0.5 - DISC.x / 2.0 - DISC.y / 4.0 - DISC.z / 6.0;
+    let inner = least + c * 0.5 + square * (DISC.x / 2.0 + square * (DISC.y / 4.0 + square * (DISC.z / 6.0)));
+    return inner + max(x - 1.0, 0.0);
+}
+
+// The sun's share at the time of day on ground of which `day` is first light, its softness, last light, its softness, and
+// `rough` how far the slopes under it spread about `slopes`. The twin is `sun_of_day` in `src/light/day.rs`.
+fn day_sun(day: vec4<f32>, rough: f32, slopes: vec2<f32>) -> f32 {
+    let to_sun = shade.to_sun.xyz;
+    let time = shade.day_time;
+    let share = max(disc((time - day.x) / day.y) - disc((time - day.z) / day.w), 0.0);
+    let level = length(to_sun.xz);
+    let mean = to_sun.y - slopes.x * to_sun.x - slopes.y * to_sun.z;
+    let width = max(2.0 * rough * level, 1e-4);
+    let x = mean / width;
+    let facing = disc(x);
+    let cosine = width * disc_integral(x) / sqrt(1.0 + dot(slopes, slopes) + 2.0 * rough * rough);
+    return min(cosine * min(share / max(facing, 1e-3), 1.0), 1.0) * shade.to_sun.w;
 }
 
 fn point_colour(point: GroundPoint) -> vec4<f32> {
@@ -34,11 +76,19 @@ fn point_colour(point: GroundPoint) -> vec4<f32> {
     if MORPHS && point.alpha > 0.0 {
         texel = mix(texel, light_at(point.level + 1u, point.from_eye), point.alpha);
     }
-    let colour = view_colour(surface_point(point, texel));
+    var sun = texel.x;
+    if DAY {
+        var day = day_at(point.level, point.from_eye);
+        if MORPHS && point.alpha > 0.0 {
+            day = mix(day, day_at(point.level + 1u, point.from_eye), point.alpha);
+        }
+        sun = day_sun(day, texel.x, texel.zw);
+    }
+    let colour = view_colour(surface_point(point, texel, sun));
     return vec4(encode(colour.rgb), colour.a);
 }
 
-fn surface_point(point: GroundPoint, texel: vec4<f32>) -> SurfacePoint {
+fn surface_point(point: GroundPoint, texel: vec4<f32>, sun: f32) -> SurfacePoint {
     let drawn_slopes = texel.zw * shade.slope_scale;
     let up_m = ((point.height - view.eye_height_m.x) - view.eye_height_m.y) * view.vertical_scale;
     var out: SurfacePoint;
@@ -47,7 +97,7 @@ fn surface_point(point: GroundPoint, texel: vec4<f32>) -> SurfacePoint {
     out.above_base_m = point.height;
     out.slopes = texel.zw;
     out.normal = normalize(vec3(-drawn_slopes.x, 1.0, -drawn_slopes.y));
-    out.sun = texel.x;
+    out.sun = sun;
     out.sky = texel.y;
     if !TRACED_LIGHT {
         out.sun = max(dot(out.normal, shade.to_sun.xyz), 0.0) * step(0.0, shade.to_sun.y);

@@ -1,7 +1,7 @@
 // The look: ground colour, light, air and sky. The twin is `src/shade.rs`, which also emits the constants in capitals.
 
 struct ShadeConstants {
-    to_sun: vec4<f32>,          // unit vector east, up, south; w unused
+    to_sun: vec4<f32>,          // unit vector east, up, south; w is 0 once its disc has set, else 1
     low_m: f32,                 // heights above the DEM's base between which the ground's tint runs
     high_m: f32,
     base_m: f32,                // height of the DEM's base above sea level
@@ -9,7 +9,7 @@ struct ShadeConstants {
     per_relief: f32,            // 1 over the metres over which the tint stretches
     eye_haze: f32,              // height of the eye above the lowest ground over HAZE_SCALE_M
     eye_density: f32,           // of the air at the eye: 1 at the lowest ground
-    unused: f32,
+    day_time: f32,              // where light is of a day: 0 at the sun's noon, -1 and 1 at the day's ends
 }
 
 @group(0) @binding(4) var<uniform> shade: ShadeConstants;

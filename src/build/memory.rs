@@ -16,6 +16,9 @@ pub const HELD_MEMORY_BYTES: u64 = 2 << 30;
 const BYTES_A_SAMPLE: u64 = 12;
 const BYTES_A_SAMPLE_WITH_LIGHT: u64 = 30;
 
+/// Bytes a sample takes where light over a day is traced: measured at 2048 x 2048.
+const BYTES_A_SAMPLE_WITH_DAY: u64 = 60;
+
 /// Bytes a column of level 0 takes in either pass of preprocessing: in the first two bands of the DEM (2 KiB), the rows of
 /// the coarser levels (1.4 KiB) and those under the kernels (0.2 KiB with 4 lobes); in the second the rows of the coarser
 /// levels (1.4 KiB) and of bounds (1.7 KiB), and while these are packed some of them twice.
@@ -81,6 +84,13 @@ pub(super) fn decoded_bytes(grid: &Grid) -> u64 {
     (grid.size.samples() as u64)
         .saturating_mul(6)
         .saturating_add(1 << 20)
+}
+
+/// The memory that preprocessing a DEM of `grid` with light over a day takes, in bytes: level 0 and its day are held.
+pub(super) fn day_bytes(grid: &Grid) -> u64 {
+    (grid.size.samples() as u64)
+        .saturating_mul(BYTES_A_SAMPLE_WITH_DAY)
+        .saturating_add(FIXED_BYTES_WITH_LIGHT)
 }
 
 /// Refuses a DEM called `name` whose grid is impossible, or of which something needs more than `ceiling_bytes`.

@@ -2,7 +2,7 @@
 //!
 //! [`preprocess`] drives the rooms above it, in passes from north to south: `heights` reads [`crate::source`] band by
 //! band, filters it by [`crate::pyramid`] and writes the tiles of all levels through [`crate::terrain`]; `bounds` reads
-//! them back and writes the bounds; `light` traces sun and sky over them by [`crate::light`]. What is held depends on the
+//! them back and writes the bounds; `light` traces sun and sky over them by [`crate::light`], `day` the light of a day. What is held depends on the
 //! DEM's width alone, except for light: it is computed beforehand, and more than the ceiling is refused.
 //! [`build_pyramid`] holds all levels in memory instead, for who draws a DEM without a file.
 //! [`relight`] gives a terrain file other light.
@@ -11,6 +11,7 @@
 
 mod bands;
 mod bounds;
+mod day;
 mod heights;
 mod light;
 mod memory;

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use super::bands::BAND_ROWS;
 use super::bounds::write_bounds;
+use super::day::write_day;
 use super::heights::write_heights;
 use super::light::{Lit, write_light};
 use super::memory::{self, DEFAULT_MEMORY_BYTES, HELD_MEMORY_BYTES, peak_rss_bytes, preprocess_bytes};
@@ -14,7 +15,7 @@ use super::threads::Threads;
 use super::tiles::put_checks;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect, Size};
-use crate::light::{Earth, LightOptions};
+use crate::light::{Day, Earth, LightOptions};
 use crate::progress::Progress;
 use crate::pyramid::{Filter, Pyramid, rounding_step};
 use crate::source::{self, Description, HeightSource};
@@ -26,6 +27,8 @@ use crate::terrain::{self, LightMeta, Meta, SourceStamp, TerrainWriter};
 pub struct PreprocessOptions {
     /// The light to trace; none leaves it out of the file.
     pub light: Option<LightOptions>,
+    /// The day whose light is traced beside that; only with light, whose sky it shares.
+    pub day: Option<Day>,
     /// Whether light is traced over the earth's curve, with which coefficient of refraction; see [`Earth::of`].
     pub curvature: Option<f64>,
     /// The filter that makes the levels above 0.
@@ -44,6 +47,7 @@ impl Default for PreprocessOptions {
     fn default() -> Self {
         Self {
             light: Some(LightOptions::default()),
+            day: None,
             curvature: None,
             filter: Filter::default(),
             force: false,
@@ -67,6 +71,8 @@ pub struct PreprocessReport {
     pub sun_s: f64,
     /// Seconds to trace the sky's share, and to filter both into levels.
     pub sky_s: f64,
+    /// Seconds to trace the light of a day, and to filter it into levels.
+    pub day_s: f64,
     /// Seconds to compress and write the file, and to have it on the disk.
     pub write_s: f64,
     /// Seconds in all.
@@ -112,7 +118,9 @@ pub fn preprocess(
     }
     let earth = Earth::of(&description.grid, description.place.as_ref(), options.curvature)
         .map_err(|e| e.about(&description.name))?;
+    check_day(options)?;
     let needed = |grid: &Grid| preprocess_bytes(grid, options.light.is_some(), source.held_bytes());
+    let needed = |grid: &Grid| needed(grid).max(options.day.map_or(0, |_| memory::day_bytes(grid)));
     let advice = if options.light.is_some() {
         "leave out the light, or cut the DEM"
     } else {
@@ -132,7 +140,7 @@ pub fn preprocess(
             rounding_step(step).ok_or_else(|| Error::new(ErrorKind::Misuse, &description.name, what()))
         })
         .transpose()?;
-    Layout::new(&description.grid, options.light.is_some())
+    Layout::new(&description.grid, options.light.is_some(), options.day.is_some())
         .map_err(|what| Error::new(ErrorKind::Limit, &description.name, what).advice("cut the DEM"))?;
     let threads = Threads::new(options.threads)?;
     let (output, file) = Output::create(out, options.force)?;
@@ -183,6 +191,13 @@ pub fn preprocess(
             let took = write_light(&heights, crests, &mut writer, &lit, &threads, progress)?;
             (report.sun_s, report.sky_s) = (took.sun_s, took.sky_s);
             report.write_s += took.write_s;
+            if let Some(day) = &options.day {
+                let filter = &options.filter;
+                let [day_s, write_s] =
+                    write_day(&heights, &mut writer, day, &earth, filter, &threads, progress)?;
+                report.day_s = day_s;
+                report.write_s += write_s;
+            }
         }
         let mut clock = clock;
         clock.lap();
@@ -253,6 +268,15 @@ impl Clock {
     fn total(&self) -> f64 {
         self.start.elapsed().as_secs_f64()
     }
+}
+
+/// Light over a day stands beside the light of one sun.
+pub(super) fn check_day(options: &PreprocessOptions) -> Result<()> {
+    if options.day.is_some() && options.light.is_none() {
+        let what = "a day is asked for and no light";
+        return Err(Error::new(ErrorKind::Misuse, "day", what).advice("trace light too"));
+    }
+    Ok(())
 }
 
 /// Replacing a DEM by what was made of it would lose it.
@@ -342,6 +366,7 @@ fn describe(
             sun_altitude_deg: light.sun.altitude_deg,
             sky_directions: light.sky_directions,
         }),
+        day: options.day,
         source,
         tool: terrain::TOOL.into(),
         assumed,
@@ -397,6 +422,7 @@ mod tests {
             "bounds_s",
             "sun_s",
             "sky_s",
+            "day_s",
             "write_s",
             "total_s",
             "samples",

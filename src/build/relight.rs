@@ -4,10 +4,11 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::time::Instant;
 
+use super::day::write_day;
 use super::light::{Lit, crests, write_light};
 use super::memory::{self, peak_rss_bytes, preprocess_bytes};
 use super::output::Output;
-use super::preprocess::{PreprocessOptions, PreprocessReport};
+use super::preprocess::{PreprocessOptions, PreprocessReport, check_day};
 use super::threads::Threads;
 use super::tiles::put_checks;
 use crate::error::{Error, ErrorKind, Result};
@@ -18,7 +19,7 @@ use crate::pyramid::{Filter, FilterKind};
 use crate::terrain::layout::Kind;
 use crate::terrain::{self, DEFAULT_CACHE_BYTES, LightMeta, Meta, TerrainFile, TerrainWriter};
 
-/// Makes the terrain file `out` of `file`, with the light that `options` say, or none, in place of its own. Heights and
+/// Makes the terrain file `out` of `file`, with the light and day that `options` say, or none, in place of its own. Heights and
 /// bounds are those of `file`, to the bit, and so are the bytes of their tiles where this version made them. `out` may
 /// be `file` itself, where `force` is set: it is replaced when the new file is whole.
 ///
@@ -38,8 +39,12 @@ pub fn relight(
     let filter = filter_of(file)?;
     if let Some(light) = &options.light {
         light.sun.check()?;
+        check_day(options)?;
         // The file's own cache is what holds tiles.
-        let needed = |grid: &Grid| preprocess_bytes(grid, true, DEFAULT_CACHE_BYTES as u64);
+        let needed = |grid: &Grid| {
+            let light = preprocess_bytes(grid, true, DEFAULT_CACHE_BYTES as u64);
+            light.max(options.day.map_or(0, |_| memory::day_bytes(grid)))
+        };
         memory::check(
             file.name(),
             grid,
@@ -94,6 +99,12 @@ pub fn relight(
             report.sky_s = took.sky_s;
             report.write_s += took.write_s;
         }
+        if let Some(day) = &options.day {
+            let made = write_day(file, &mut writer, day, &earth, &filter, &threads, progress);
+            let [day_s, write_s] = made.map_err(named)?;
+            report.day_s = day_s;
+            report.write_s += write_s;
+        }
         let written = Instant::now();
         put_checks(&mut writer, &threads, progress).map_err(named)?;
         writer.finish().map_err(named)?;
@@ -132,6 +143,7 @@ fn describe(file: &TerrainFile, options: &PreprocessOptions, earth: &Earth) -> M
         sun_altitude_deg: light.sun.altitude_deg,
         sky_directions: light.sky_directions,
     });
+    meta.day = options.day;
     meta.tool = terrain::TOOL.into();
     let earth = options.light.map(|_| *earth);
     Earth::assume(earth.as_ref(), meta.place.as_ref(), &meta.grid, &mut meta.assumed);

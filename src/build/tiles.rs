@@ -78,7 +78,7 @@ pub(super) fn put_checks<W: Write + Seek + Sync + Send>(
     work: &dyn Work,
     progress: &dyn Progress,
 ) -> Result<()> {
-    for kind in [Kind::Check, Kind::CheckBounds] {
+    for kind in [Kind::Check, Kind::CheckDay, Kind::CheckBounds] {
         for row in writer.layout().order_of(kind) {
             let count = writer.layout().parts()[row.part].tiles().width;
             let encoded = each_tile(0, count, work, progress, |x| {

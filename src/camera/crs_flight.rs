@@ -68,6 +68,8 @@ struct WrittenKey {
     roll: f64,
     #[serde(default = "default_fov_deg")]
     fov: f64,
+    #[serde(default)]
+    sun_time: Option<f64>,
 }
 
 impl CrsFlight {
@@ -101,6 +103,7 @@ impl CrsFlight {
                 pitch_deg: key.pitch,
                 roll_deg: key.roll,
                 fov_deg: key.fov,
+                sun_hour: key.sun_time,
             });
         }
         Ok(Self {

@@ -9,7 +9,8 @@
 //!
 //! `t` in seconds, strictly rising; `eye` in world metres (x east, y up, z south; before vertical scale);
 //! angles in degrees. `fps` (30), `frame` (`world`), `roll` (0) and `fov` (60) may be left out; unknown keys
-//! are refused.
+//! are refused. `sun_time`, in all keys or in none, is the hour by the sun of terrain with light over a day: it stands highest
+//! at 12; between keys it is linear.
 //!
 //! Between keys i and i + 1, with h = t[i+1] - t[i] and u = (t - t[i]) / h, every value is the cubic Hermite
 //! polynomial
@@ -60,6 +61,9 @@ pub struct Key {
     /// Vertical field of view in degrees, above 0 and below 180.
     #[serde(rename = "fov", default = "default_fov_deg")]
     pub fov_deg: f64,
+    /// The hour by the sun, which stands highest at 12, for terrain with light over a day.
+    #[serde(rename = "sun_time", default, skip_serializing_if = "Option::is_none")]
+    pub sun_hour: Option<f64>,
 }
 
 pub(super) fn default_fov_deg() -> f64 {
@@ -76,6 +80,7 @@ impl Key {
             pitch_deg: camera.pitch_deg,
             roll_deg: camera.roll_deg,
             fov_deg: camera.fov_deg,
+            sun_hour: None,
         }
     }
 
@@ -173,6 +178,13 @@ impl Flight {
                     key.t_s
                 )));
             }
+            if key.sun_hour.is_some_and(|hour| !(-24.0..=48.0).contains(&hour)) {
+                return Err(refuse(format!("key {i}: sun_time is no hour from -24 to 48")));
+            }
+            if key.sun_hour.is_some() != keys[0].sun_hour.is_some() {
+                return Err(refuse(format!("key {i}: sun_time is in some keys only"))
+                    .advice("give it in all of them, or in none"));
+            }
             if i > 0 && key.t_s <= keys[i - 1].t_s {
                 let before = keys[i - 1].t_s;
                 return Err(
@@ -203,7 +215,10 @@ impl Flight {
     /// # Errors
     /// [`ErrorKind::Broken`] where a height leaves the range of keys.
     pub fn scaled_down(&self, vertical_scale: f64) -> Result<Self> {
-        let scaled = |key: &Key| Key::new(key.t_s, &key.camera().scaled_down(vertical_scale));
+        let scaled = |key: &Key| Key {
+            sun_hour: key.sun_hour,
+            ..Key::new(key.t_s, &key.camera().scaled_down(vertical_scale))
+        };
         Self::new(self.fps, self.keys.iter().map(scaled).collect())
     }
 
@@ -270,6 +285,22 @@ impl Flight {
     /// The time of frame `k` in seconds, `k / fps`, but not past the last key.
     pub fn time_of_frame_s(&self, k: u64) -> f64 {
         (k as f64 / self.fps).min(self.end_s())
+    }
+
+    /// The hour by the sun at `t_s` seconds, where the keys have hours: linear between keys, before the first that of the
+    /// first, after the last that of the last.
+    pub fn sun_hour_at(&self, t_s: f64) -> Option<f64> {
+        let after = self.keys.partition_point(|k| k.t_s <= t_s);
+        let (from, to) = (
+            &self.keys[after.saturating_sub(1)],
+            &self.keys[after.min(self.keys.len() - 1)],
+        );
+        let (a, b) = (from.sun_hour?, to.sun_hour?);
+        if after == 0 || after == self.keys.len() {
+            return Some(a);
+        }
+        let share = (t_s - from.t_s) / (to.t_s - from.t_s);
+        Some(a + share * (b - a))
     }
 
     /// The camera of frame `k`.

@@ -24,7 +24,7 @@ pub(super) use self::render::{CameraArgs, RenderArgs, ViewArgs};
 use super::values;
 #[cfg(feature = "dem")]
 use crate::build::PartKind;
-use crate::light::{DEFAULT_SKY_DIRECTIONS, Moment, Sun};
+use crate::light::{DAY_POSITIONS, DEFAULT_SKY_DIRECTIONS, Moment, Sun};
 use crate::pyramid::FilterKind;
 
 /// A terrain geometry clipmap engine: from a DEM to frames, and how wrong they are.
@@ -98,6 +98,12 @@ pub(super) struct PreprocessArgs {
     /// Where the sun stands at a time, as in 2026-06-21T09:00:00Z, over the middle of the DEM
     #[arg(long, value_name = "TIME", value_parser = values::moment, conflicts_with_all = ["sun", "no_light"])]
     pub(super) sun_at: Option<Moment>,
+
+    /// Trace light for the whole day of --sun-at too, from this many suns, so that render --sun-time and flights show any
+    /// time of it
+    #[arg(long, value_name = "N", requires = "sun_at", allow_negative_numbers = true)]
+    #[arg(value_parser = clap::value_parser!(u32).range(i64::from(*DAY_POSITIONS.start())..=i64::from(*DAY_POSITIONS.end())))]
+    pub(super) day: Option<u32>,
 
     /// Degrees north of the equator from where --sun-at sees the sun, in place of the DEM's middle
     #[arg(long, value_name = "DEGREES", value_parser = values::latitude, allow_hyphen_values = true)]

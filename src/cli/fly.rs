@@ -48,6 +48,7 @@ pub(super) fn run(args: &FlyArgs, terminal: &Terminal) -> Outcome {
         tint: !args.view.no_tint,
         haze: !args.view.no_haze,
         sun: args.view.sun.unwrap_or_default(),
+        sun_time: args.view.sun_time,
         clipmap,
         folder: folder(&args.output_dir),
         stem: stem(&inputs[0]),
@@ -55,7 +56,7 @@ pub(super) fn run(args: &FlyArgs, terminal: &Terminal) -> Outcome {
         loses_device: args.loses_device,
     };
     let read = args.read.options();
-    let sun = args.view.sun;
+    let (sun, sun_time) = (args.view.sun, args.view.sun_time);
     let at_once = match args.view.wait {
         Wait::All => None,
         Wait::None => Some(AtOnce {
@@ -77,6 +78,9 @@ pub(super) fn run(args: &FlyArgs, terminal: &Terminal) -> Outcome {
             Some(at_once) => Terrain::open_at_once(&inputs, &read, at_once, progress)?,
             None => Terrain::open_with(&inputs, &read, progress)?.with_tiles(&tiles)?,
         };
+        if sun_time.is_some() && terrain.day().is_none() {
+            return Err(render::no_day(&terrain, "--sun-time"));
+        }
         if sun.is_some_and(|sun| terrain.sun().is_some_and(|traced| traced != sun)) {
             progress.warn(&format!(
                 "{}: its light is traced already, so --sun changes nothing",

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::args::InfoArgs;
 use super::input::{self, Input};
+use super::preprocess::clock;
 use super::suspects::Suspects;
 use super::{Failure, Outcome, print, say};
 use crate::error::{Error, Result};
@@ -61,10 +62,24 @@ struct Info {
     levels: u32,
     /// How its light was traced; null where it has none.
     light: Option<Light>,
+    /// Its light over a day; null where it has none.
+    day: Option<DayInfo>,
     /// What was assumed because the file does not say, as sentences.
     assumed: Vec<String>,
     /// What a look at the samples showed that a user should know, as sentences.
     noticed: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct DayInfo {
+    /// Suns that light was traced from.
+    positions: u32,
+    /// The moment of the sun's noon.
+    noon: String,
+    /// Hours by the sun, which stands highest at 12, at which the day begins and ends.
+    hours: [f64; 2],
+    /// Latitude and longitude in degrees.
+    seen_from: [f64; 2],
 }
 
 #[derive(Debug, Serialize)]
@@ -148,7 +163,7 @@ fn of_terrain(file: &TerrainFile, all: bool, progress: &dyn Progress) -> Result<
     } else {
         bounded_heights(file)?
     };
-    Ok(Info::new(
+    let mut info = Info::new(
         grid,
         "terrain file",
         "float32",
@@ -157,7 +172,14 @@ fn of_terrain(file: &TerrainFile, all: bool, progress: &dyn Progress) -> Result<
         heights,
         meta.light,
         &meta.assumed,
-    ))
+    );
+    info.day = meta.day.map(|day| DayInfo {
+        positions: day.positions,
+        noon: day.noon.to_string(),
+        hours: [-1.0, 1.0].map(|end| day.hour_of_time(end)),
+        seen_from: [day.latitude_deg, day.longitude_deg],
+    });
+    Ok(info)
 }
 
 /// Reads all heights, band by band.
@@ -260,6 +282,7 @@ impl Info {
                 sun: [l.sun_azimuth_deg, l.sun_altitude_deg],
                 sky_directions: l.sky_directions,
             }),
+            day: None,
             assumed: assumed.to_vec(),
             noticed: Vec::new(),
         }
@@ -330,6 +353,16 @@ fn text(name: &str, info: &Info, verified: bool) -> String {
             );
         }
         None => line("light", "none".into()),
+    }
+    if let Some(day) = &info.day {
+        let [from, until] = day.hours.map(clock);
+        line(
+            "day",
+            format!(
+                "{from} to {until} by the sun, noon at {}; from {} suns",
+                day.noon, day.positions
+            ),
+        );
     }
     for sentence in &info.assumed {
         line("assumed", sentence.clone());

@@ -8,7 +8,7 @@ use super::input::{self, Input};
 use super::progress::Terminal;
 use crate::build::{self, Output, PreprocessOptions};
 use crate::error::{Error, ErrorKind};
-use crate::light::{self, LightOptions, Sun};
+use crate::light::{self, Day, LightOptions, Sun};
 use crate::progress::Progress;
 
 /// Runs the command.
@@ -41,6 +41,7 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
             )
         }
     };
+    let mut day = None;
     let sun = match args.sun_at {
         None => args.sun.unwrap_or_default(),
         Some(moment) => {
@@ -54,10 +55,21 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
                 return Err(error.advice("give --lat and --lon").into());
             };
             let sun = Sun::at(moment, latitude_deg, longitude_deg)?;
+            day = args
+                .day
+                .map(|positions| Day::of(moment, latitude_deg, longitude_deg, positions))
+                .transpose()?;
             terminal.note(&format!(
                 "the sun stands at azimuth {:.2}, altitude {:.2} degrees, seen from {latitude_deg:.4}, {longitude_deg:.4}",
                 sun.azimuth_deg, sun.altitude_deg
             ));
+            if let Some(day) = &day {
+                let hours = [-1.0, 1.0].map(|end| clock(day.hour_of_time(end)));
+                terminal.note(&format!(
+                    "the day runs from {} to {} by the sun, its noon is {}",
+                    hours[0], hours[1], day.noon
+                ));
+            }
             sun
         }
     };
@@ -67,6 +79,7 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
             sun,
             sky_directions: args.sky_directions,
         }),
+        day,
         curvature: args.curvature,
         filter: args.filter.unwrap_or_default().into(),
         force: args.force,
@@ -97,4 +110,10 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
     }
     terminal.note(&format!("{} is made, in {:.1} s", out.display(), report.total_s));
     Ok(())
+}
+
+/// An hour as clocks show it.
+pub(super) fn clock(hour: f64) -> String {
+    let minutes = (hour * 60.0).round() as i64;
+    format!("{}:{:02}", minutes.div_euclid(60), minutes.rem_euclid(60))
 }

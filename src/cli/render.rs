@@ -13,12 +13,12 @@ use super::view_values::ClipSize;
 use super::{Failure, Outcome};
 use crate::build::{Output, refuse_existing};
 use crate::camera::{Flight, MAX_EYE_M, check_picture, overview};
-use crate::clipmap::{ClipmapOptions, Wait, fit_clip_size, height_range_m};
+use crate::clipmap::{AHEAD_S, ClipmapOptions, FRAME_BYTES, Wait, fit_clip_size, height_range_m};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu;
 use crate::grid::Grid;
 use crate::levels::Levels;
-use crate::light::LightOptions;
+use crate::light::{Day, LightOptions};
 use crate::progress::Progress;
 use crate::render::{Headless, HeadlessOptions, Recording, picture};
 use crate::shade::ViewMode;
@@ -76,6 +76,8 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     let terrain = Arc::new(open(args, folder.clone(), &tiles, terminal)?);
     warn_of_sun(args, &terrain, terminal);
     let flight = flight.map(|flight| flight.over(&terrain)).transpose()?;
+    let day = day_of(args, flight.as_ref(), &terrain)?;
+    clipmap.day = day.is_some();
     let camera = camera(&args.camera, args.view.vertical_scale, &terrain)?;
     let scale = args.view.vertical_scale;
     let heights = height_range_m(terrain.as_ref())?.map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
@@ -100,6 +102,12 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     };
     let mut headless = Headless::new(gpu, levels, &headless_options(&args.view, &terrain, &clipmap))?;
     headless.set_truth(terrain.clone());
+    if let Some(day) = day {
+        headless.set_day(day)?;
+        if let Some(time) = args.view.sun_time {
+            headless.set_time_of_day(time.in_day(&day))?;
+        }
+    }
     if args.measure {
         headless.measure()?;
     }
@@ -162,6 +170,28 @@ pub(super) fn run(args: &RenderArgs, terminal: &Terminal) -> Outcome {
     Ok(())
 }
 
+/// The day whose light is shown, if a time of one is asked for.
+fn day_of(args: &RenderArgs, flight: Option<&Flight>, terrain: &Terrain) -> Result<Option<Day>> {
+    let in_keys = flight.is_some_and(|flight| flight.sun_hour_at(0.0).is_some());
+    let asker = match (args.view.sun_time, in_keys) {
+        (None, false) => return Ok(None),
+        (Some(_), true) => {
+            let what = "is given, and the flight's keys have a sun_time of their own";
+            return Err(Error::new(ErrorKind::Misuse, "--sun-time", what).advice("leave one of them out"));
+        }
+        (Some(_), false) => "--sun-time",
+        (None, true) => "sun_time in the flight",
+    };
+    terrain.day().map(Some).ok_or_else(|| no_day(terrain, asker))
+}
+
+/// Terrain without light over a day was asked for its time.
+pub(super) fn no_day(terrain: &Terrain, asker: &str) -> Error {
+    let what = format!("has no light over a day, so {asker} has no meaning");
+    Error::new(ErrorKind::Misuse, terrain.name(), what)
+        .advice("make it with clipscape preprocess --sun-at TIME --day N")
+}
+
 /// The fastest flight at which every level would have stayed fresh, by what loading took.
 fn fastest_fresh_m_s(
     terrain: &Terrain,
@@ -173,8 +203,9 @@ fn fastest_fresh_m_s(
     let flown = Flown {
         clip_size: clipmap.clip_size,
         levels: headless.clipmap().windows().len() as u32,
-        upload_budget_bytes: clipmap.upload_budget_bytes,
+        upload_budget_bytes: clipmap.upload_budget_bytes.or(Some(FRAME_BYTES)),
         fps: flight.fps(),
+        ahead_s: AHEAD_S,
     };
     terrain.pace().map(|pace| pace.fastest_m_s(&flown))
 }

@@ -5,7 +5,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 #[cfg(feature = "dem")]
 use crate::build::PartKind;
 use crate::grid::Rect;
-use crate::light::{Moment, Sun};
+use crate::light::{Moment, Sun, SunTime};
 use crate::pyramid::FilterKind;
 use crate::source::{Band, RawLayout, SampleType};
 
@@ -108,6 +108,11 @@ pub(super) fn sun(text: &str) -> Result<Sun, String> {
 
 /// A moment, as in 2026-06-21T09:00:00Z.
 pub(super) fn moment(text: &str) -> Result<Moment, String> {
+    text.parse()
+}
+
+/// A time of day, as 9:30 by the sun or a moment.
+pub(super) fn sun_time(text: &str) -> Result<SunTime, String> {
     text.parse()
 }
 

@@ -37,6 +37,12 @@ impl Clipmap {
         self.has_light
     }
 
+    /// Whether the windows hold light over a day: the terrain has it, and [`ClipmapOptions::day`](super::ClipmapOptions::day)
+    /// asked for it.
+    pub fn has_day(&self) -> bool {
+        self.has_day
+    }
+
     /// Least and greatest height of the DEM in metres above its base; 0 where it has none.
     pub fn height_range_m(&self) -> [f32; 2] {
         self.range_m

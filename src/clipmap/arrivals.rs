@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::eye::Eye;
 use super::missing::distance;
-use super::plan::{HEIGHT_BYTES, LIGHT_BYTES, LevelPlan, UpdatePlan};
+use super::plan::{HEIGHT_BYTES, LevelPlan, UpdatePlan};
 use super::succession::Successor;
 use super::window::{Scratch, Window, is_damage};
 use crate::error::{Error, ErrorKind, Result};
@@ -56,7 +56,7 @@ impl Faults {
 
 /// Bytes of samples that an update writes at most where no budget is set, but for the first: filling in that much takes
 /// 1 to 2 ms, and what has arrived all at once can wait a frame.
-const FRAME_BYTES: u64 = 768 << 10;
+pub const FRAME_BYTES: u64 = 768 << 10;
 
 /// Where the eye is, and where it is going.
 #[derive(Clone, Copy, Debug)]
@@ -290,7 +290,7 @@ fn each(window: &mut Window, mut read: impl FnMut(&mut Window, Rect) -> Result<R
 /// The bytes of samples that `rect` writes.
 pub(super) fn bytes(window: &Window, rect: Rect) -> u64 {
     let light = window.light_of(rect);
-    rect.area() as u64 * HEIGHT_BYTES + light.area() as u64 * LIGHT_BYTES
+    rect.area() as u64 * HEIGHT_BYTES + light.area() as u64 * window.light_bytes()
 }
 
 /// The part of `rect` that `limit_bytes` pay for: whole rows where that is one, else a part of a row; from the side

@@ -35,7 +35,7 @@ mod succession;
 mod vertex;
 mod window;
 
-pub use arrivals::Wait;
+pub use arrivals::{FRAME_BYTES, Wait};
 pub use certificate::{
     Certificate, CertifiedPatch, Terms, Uncertified, certified_patches, certify, certify_by,
 };
@@ -49,6 +49,7 @@ pub use fit::{ClipSizeFit, fit_clip_size};
 pub use frustum::Frustum;
 pub use held::{FADE_S, HeldField};
 pub use options::{ClipmapOptions, MAX_ERROR_PX, MAX_VERTICAL_SCALE};
+use plan::exposed_bytes_of;
 pub use plan::{HEIGHT_BYTES, LIGHT_BYTES, LevelPlan, UpdatePlan, exposed_bytes};
 pub use range::height_range_m;
 pub(crate) use relief::light_texels;
@@ -57,7 +58,7 @@ pub use scene::Scene;
 pub use screen::Screen;
 pub use selection::{CLOSER_TRIANGLES, Instance, PATCH_TRIANGLES, Selection, Side};
 pub use vertex::{Vertex, displace};
-pub use window::{LightTexel, PatchInfo, Window};
+pub use window::{DayTexel, LightTexel, PatchInfo, Window};
 
 use crate::camera::View;
 use crate::error::{Error, ErrorKind, Result};
@@ -75,7 +76,7 @@ use succession::Successor;
 use window::Scratch;
 
 /// Seconds of flight for which what windows will gain is wanted beforehand, without waiting.
-const AHEAD_S: f64 = 1.0;
+pub const AHEAD_S: f64 = 1.0;
 
 /// The clipmap of one view.
 #[derive(Clone, Debug)]
@@ -90,6 +91,8 @@ pub struct Clipmap {
     levels_asked: Option<u32>,
     cut: bool,
     has_light: bool,
+    day_asked: bool,
+    has_day: bool,
     range_m: [f32; 2],
     windows: Vec<Window>,
     /// By level: the window that is to take a window's place, where the terrain has something better.
@@ -130,6 +133,7 @@ impl Clipmap {
             Some(_) => levels.level_count(),
         };
         let count = options.levels.map_or(fitting, |l| l.min(fitting));
+        let has_day = options.day && levels.has_day();
         Ok(Self {
             identity: Identity::new(),
             grid,
@@ -141,8 +145,12 @@ impl Clipmap {
             levels_asked: options.levels,
             cut: count < fitting,
             has_light: levels.has_light(),
+            day_asked: options.day,
+            has_day,
             range_m: height_range_m(levels)?,
-            windows: (0..count).map(|l| Window::new(l, &grid, &ring)).collect(),
+            windows: (0..count)
+                .map(|l| Window::new(l, &grid, &ring).with_day(has_day))
+                .collect(),
             successors: vec![None; count as usize],
             edition: levels.edition(),
             held: HeldField::new(count, ring.held_size()),
@@ -166,8 +174,8 @@ impl Clipmap {
 
     /// Takes over from `options` what can change without reading anything anew, from the next update on: transition,
     /// vertical scale, culling, the promised error and the budget. False, and nothing changed, where they ask for another
-    /// clip size or other levels, for a promise where none was or none where one was, or for waiting where it did not or
-    /// the reverse: that takes a clipmap of its own.
+    /// clip size or other levels, for a promise where none was or none where one was, and likewise for light over a day and
+    /// for waiting: that takes a clipmap of its own.
     ///
     /// # Errors
     /// [`ErrorKind::Misuse`] for options out of range.
@@ -177,7 +185,8 @@ impl Clipmap {
         let same = ring.clip_size == self.ring.clip_size
             && options.max_error_px.is_some() == self.max_error_px.is_some()
             && options.wait == self.wait
-            && options.levels == self.levels_asked;
+            && options.levels == self.levels_asked
+            && options.day == self.day_asked;
         if same {
             self.ring = ring;
             self.vertical_scale = options.vertical_scale;
@@ -216,7 +225,8 @@ impl Clipmap {
         let mut exposed = 0;
         for plan in self.plan.levels() {
             let light_size = self.grid.level(light_level(plan.level));
-            exposed += exposed_bytes(plan.level, plan.from, plan.to, light_size);
+            let light_bytes = self.windows[plan.level as usize].light_bytes();
+            exposed += exposed_bytes_of(plan.level, plan.from, plan.to, light_size, light_bytes);
             self.windows[plan.level as usize].move_to(plan.to);
             if let Some(successor) = &mut self.successors[plan.level as usize] {
                 successor.move_to(plan.to);
@@ -318,7 +328,7 @@ impl Clipmap {
         }
         self.edition = edition;
         for (window, successor) in self.windows.iter_mut().zip(&mut self.successors) {
-            let fresh = Window::new(window.level(), &self.grid, &self.ring);
+            let fresh = Window::new(window.level(), &self.grid, &self.ring).with_day(self.has_day);
             match self.wait {
                 Wait::All => *window = fresh,
                 Wait::None => *successor = Some(Successor::new(fresh)),

@@ -37,6 +37,8 @@ pub struct ClipmapOptions {
     /// The most bytes of samples that an update writes, beside the coarsest level; where none, as many as take about 2 ms,
     /// and no limit for the first. Only without waiting.
     pub upload_budget_bytes: Option<u64>,
+    /// Whether windows hold light over a day too, where the terrain has it: 8 bytes a light texel more.
+    pub day: bool,
 }
 
 impl Default for ClipmapOptions {
@@ -51,6 +53,7 @@ impl Default for ClipmapOptions {
             max_error_px: None,
             wait: Wait::All,
             upload_budget_bytes: None,
+            day: false,
         }
     }
 }

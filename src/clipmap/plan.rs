@@ -20,6 +20,8 @@ pub struct LevelPlan {
     pub heights: Vec<Rect>,
     /// Disjoint rectangles of light texels, split at their texture's seam, over the same ground.
     pub light: Vec<Rect>,
+    /// Whether light over a day is written with it, a rectangle and as many bytes more for each of light.
+    pub day: bool,
 }
 
 impl LevelPlan {
@@ -31,6 +33,7 @@ impl LevelPlan {
             to: Rect::EMPTY,
             heights: Vec::new(),
             light: Vec::new(),
+            day: false,
         }
     }
 }
@@ -50,6 +53,7 @@ impl UpdatePlan {
             to: Rect::EMPTY,
             heights: Vec::with_capacity(16),
             light: Vec::with_capacity(16),
+            day: false,
         };
         Self {
             levels: (0..levels).rev().map(level).collect(),
@@ -64,6 +68,7 @@ impl UpdatePlan {
             plan.to = window.target(eye);
             plan.heights.clear();
             plan.light.clear();
+            plan.day = !window.day().is_empty();
         }
     }
 
@@ -79,15 +84,18 @@ impl UpdatePlan {
 
     /// The rectangles that are written.
     pub fn uploads(&self) -> usize {
-        self.levels.iter().map(|l| l.heights.len() + l.light.len()).sum()
+        self.levels
+            .iter()
+            .map(|l| l.heights.len() + l.light.len() * (1 + usize::from(l.day)))
+            .sum()
     }
 
-    /// The bytes that are written: 4 a height, 8 a light texel.
+    /// The bytes that are written: 4 a height, 8 a light texel, 8 more where light over a day is held.
     pub fn bytes(&self) -> u64 {
         let area = |rects: &[Rect]| rects.iter().map(|r| r.area()).sum::<i64>() as u64;
         self.levels
             .iter()
-            .map(|l| area(&l.heights) * HEIGHT_BYTES + area(&l.light) * LIGHT_BYTES)
+            .map(|l| area(&l.heights) * HEIGHT_BYTES + area(&l.light) * LIGHT_BYTES * (1 + u64::from(l.day)))
             .sum()
     }
 }
@@ -101,6 +109,17 @@ pub const LIGHT_BYTES: u64 = size_of::<LightTexel>() as u64;
 /// The bytes that a move of a level's window from `from` to `to` exposes, computed from the two windows alone: what
 /// an update must write at least. `light_level_size` is the size of the level whose light it holds.
 pub fn exposed_bytes(level: u32, from: Rect, to: Rect, light_level_size: crate::grid::Size) -> u64 {
+    exposed_bytes_of(level, from, to, light_level_size, LIGHT_BYTES)
+}
+
+/// The same where a texel of light takes `light_bytes`.
+pub(super) fn exposed_bytes_of(
+    level: u32,
+    from: Rect,
+    to: Rect,
+    light_level_size: crate::grid::Size,
+    light_bytes: u64,
+) -> u64 {
     let fresh = |from: Rect, to: Rect| (to.area() - to.intersection(from).area()) as u64;
     let scale = if level == 0 { 1 } else { 2 };
     let light = |r: Rect| {
@@ -113,5 +132,5 @@ pub fn exposed_bytes(level: u32, from: Rect, to: Rect, light_level_size: crate::
         )
     };
     let light_from = if from.is_empty() { Rect::EMPTY } else { light(from) };
-    fresh(from, to) * HEIGHT_BYTES + fresh(light_from, light(to)) * LIGHT_BYTES
+    fresh(from, to) * HEIGHT_BYTES + fresh(light_from, light(to)) * light_bytes
 }

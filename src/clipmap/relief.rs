@@ -1,15 +1,21 @@
-//! Light texels: light as it was traced, beside the slopes of the heights, at one level's resolution.
+//! Light texels: light as it was traced, beside the slopes of the heights, at one level's resolution; and light over a day.
 
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 
-use super::window::{LightTexel, Scratch};
+use super::window::{DayTexel, LightTexel, Scratch};
 use crate::error::Result;
 use crate::grid::Rect;
-use crate::levels::{Arrival, Levels, LightSample};
+use crate::levels::{Arrival, DaySample, Levels, LightSample};
 
-/// Reads `rect` of level `level` into `scratch.texels`.
-pub(super) fn read(source: &dyn Levels, level: u32, rect: Rect, scratch: &mut Scratch) -> Result<Arrival> {
+/// Reads `rect` of level `level` into `scratch.texels`, and its light over a day into `scratch.days` if `day`.
+pub(super) fn read(
+    source: &dyn Levels,
+    level: u32,
+    rect: Rect,
+    day: bool,
+    scratch: &mut Scratch,
+) -> Result<Arrival> {
     let grid = source.grid();
     let around = rect.grown(1).intersection(grid.level(level).rect());
     scratch.relief.resize(around.area() as usize, 0.0);
@@ -21,6 +27,17 @@ pub(super) fn read(source: &dyn Levels, level: u32, rect: Rect, scratch: &mut Sc
         .resize(rect.area() as usize, LightSample::default());
     if source.has_light() && source.light(level, rect, &mut scratch.shares)? == Arrival::Missing {
         return Ok(Arrival::Missing);
+    }
+    scratch.days.clear();
+    if day {
+        scratch
+            .day_samples
+            .resize(rect.area() as usize, DaySample::default());
+        if source.day(level, rect, &mut scratch.day_samples)? == Arrival::Missing {
+            return Ok(Arrival::Missing);
+        }
+        let texel = |s: &DaySample| -> DayTexel { [s.first, s.first_soft, s.last, s.last_soft] };
+        scratch.days.extend(scratch.day_samples.iter().map(texel));
     }
     let step = (1i64 << level) as f64;
     let spacing_m = grid.spacing_m.map(|s| (s * step) as f32);
@@ -58,6 +75,11 @@ pub(super) fn read(source: &dyn Levels, level: u32, rect: Rect, scratch: &mut Sc
         let texel = |(share, slopes): (&LightSample, &[f16])| [share.sun, share.sky, slopes[0], slopes[1]];
         texels.extend(shares.iter().zip(rows.halves.chunks_exact(2)).map(texel));
     }
+    if day {
+        for (texel, sample) in scratch.texels.iter_mut().zip(&scratch.day_samples) {
+            texel[0] = rough(level, sample.slope, texel[2], texel[3]);
+        }
+    }
     Ok(Arrival::Arrived)
 }
 
@@ -75,7 +97,7 @@ pub(super) struct Rows {
 /// Those of `source`.
 pub(crate) fn light_texels(source: &dyn Levels, level: u32, rect: Rect) -> Result<Option<Vec<LightTexel>>> {
     let mut scratch = Scratch::default();
-    Ok(match read(source, level, rect, &mut scratch)? {
+    Ok(match read(source, level, rect, false, &mut scratch)? {
         Arrival::Arrived => Some(scratch.texels),
         Arrival::Missing => None,
     })
@@ -87,21 +109,42 @@ pub(super) fn read_coarser(
     source: &dyn Levels,
     level: u32,
     rect: Rect,
+    day: bool,
     scratch: &mut Scratch,
 ) -> Result<Arrival> {
     // The coarse sample where both indices are even, else the ends of the edge or diagonal that holds the texel.
     let coarse = Rect::new(rect.x0 >> 1, rect.z0 >> 1, (rect.x1 >> 1) + 1, (rect.z1 >> 1) + 1)
         .intersection(source.grid().level(level + 1).rect());
-    if read(source, level + 1, coarse, scratch)? == Arrival::Missing {
+    if read(source, level + 1, coarse, day, scratch)? == Arrival::Missing {
         return Ok(Arrival::Missing);
     }
-    let texels = std::mem::take(&mut scratch.texels);
-    let at = |i: i64, j: i64| texels[((j - coarse.z0) * coarse.width() + (i - coarse.x0)) as usize];
-    scratch.texels.extend(rect.cells().map(|(i, j)| -> LightTexel {
-        let (a, b) = (at(i >> 1, j >> 1), at((i + 1) >> 1, (j + 1) >> 1));
-        std::array::from_fn(|k| f16::from_f32((a[k].to_f32() + b[k].to_f32()) / 2.0))
-    }));
+    let between = |texels: Vec<[f16; 4]>| {
+        let at = |i: i64, j: i64| texels[((j - coarse.z0) * coarse.width() + (i - coarse.x0)) as usize];
+        let mean = |(i, j): (i64, i64)| -> [f16; 4] {
+            let (a, b) = (at(i >> 1, j >> 1), at((i + 1) >> 1, (j + 1) >> 1));
+            std::array::from_fn(|k| f16::from_f32((a[k].to_f32() + b[k].to_f32()) / 2.0))
+        };
+        rect.cells().map(mean).collect()
+    };
+    scratch.texels = between(std::mem::take(&mut scratch.texels));
+    if day {
+        scratch.days = between(std::mem::take(&mut scratch.days));
+    }
     Ok(Arrival::Arrived)
+}
+
+/// How far the slopes of level 0 under a sample spread about those of its level, root mean square of an axis, from the
+/// root of their mean square. On level 0 they are its own.
+fn rough(level: u32, slope: f16, east: f16, south: f16) -> f16 {
+    if level == 0 {
+        return f16::ZERO;
+    }
+    let [slope, east, south] = [slope, east, south].map(f16::to_f32);
+    f16::from_f32(
+        (0.5 * (slope * slope - east * east - south * south))
+            .max(0.0)
+            .sqrt(),
+    )
 }
 
 /// The slope at `here` (rise over run, no unit) from its neighbours: central where both are there, one-sided where

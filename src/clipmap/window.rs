@@ -8,11 +8,11 @@ use super::arrivals::Faults;
 use super::constants::{Ring, VOID_HEIGHT, light_level};
 use super::eye::Eye;
 use super::missing::Missing;
-use super::plan::LevelPlan;
+use super::plan::{LIGHT_BYTES, LevelPlan};
 use super::relief;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, PATCH, Patch, Rect, Size, seam_pieces, slot};
-use crate::levels::{Arrival, Bounds, Data, Levels, Wanted};
+use crate::levels::{Arrival, Bounds, Data, DaySample, Levels, Wanted};
 
 /// What a window knows of a patch.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +28,11 @@ pub struct PatchInfo {
 /// A texel of the light texture: share of the sun, share of the sky, slope to the east, slope to the south.
 pub type LightTexel = [f16; 4];
 
+/// A texel of light over a day: first light, its softness, last light, its softness; see
+/// [`crate::light::sun_of_day`]. Beside it the light texel holds, in place of the share of the sun, how far the slopes of
+/// the ground under it spread about the level's.
+pub type DayTexel = [f16; 4];
+
 /// The samples of a level around the camera, addressed toroidally.
 #[derive(Clone, Debug)]
 pub struct Window {
@@ -41,6 +46,8 @@ pub struct Window {
     light_level_size: Size,
     light_shift: [i64; 2],
     light: Vec<LightTexel>,
+    /// Empty where no light over a day is held.
+    day: Vec<DayTexel>,
     patch_slots: i64,
     patch_resident: Rect,
     patches: Vec<Option<PatchInfo>>,
@@ -68,6 +75,7 @@ impl Window {
             light_level_size: grid.level(light_level(level)),
             light_shift: grid.offset.map(|o| o >> light_level(level)),
             light: vec![LightTexel::default(); (light_n * light_n) as usize],
+            day: Vec::new(),
             patch_slots,
             patch_resident: Rect::EMPTY,
             patches: vec![None; (patch_slots * patch_slots) as usize],
@@ -76,6 +84,14 @@ impl Window {
             provisional: false,
             missing: Missing::default(),
         }
+    }
+
+    /// The same, which holds light over a day too if `day`.
+    #[must_use]
+    pub fn with_day(mut self, day: bool) -> Self {
+        let count = if day { self.light.len() } else { 0 };
+        self.day = vec![DayTexel::default(); count];
+        self
     }
 
     /// The level.
@@ -185,6 +201,20 @@ impl Window {
         &self.light
     }
 
+    /// The mirror of the texture of light over a day, in the slots of light; empty where none is held.
+    pub fn day(&self) -> &[DayTexel] {
+        &self.day
+    }
+
+    /// Bytes of a light texel, light over a day included where it is held.
+    pub fn light_bytes(&self) -> u64 {
+        if self.day.is_empty() {
+            LIGHT_BYTES
+        } else {
+            2 * LIGHT_BYTES
+        }
+    }
+
     /// Slots along a side of the light texture.
     pub fn light_size(&self) -> i64 {
         self.light_n
@@ -241,6 +271,9 @@ impl Window {
         if has_light {
             add(Data::Light, fine, light);
         }
+        if !self.day.is_empty() {
+            add(Data::Day, fine, light);
+        }
         // For the slopes.
         add(
             Data::Heights,
@@ -293,9 +326,10 @@ impl Window {
         let light = self.light_of(rect);
         for piece in seam_pieces(light, self.light_n, self.light_shift) {
             let fine = light_level(self.level);
-            let arrival = match (relief::read(source, fine, piece, scratch), &mut faults) {
+            let day = !self.day.is_empty();
+            let arrival = match (relief::read(source, fine, piece, day, scratch), &mut faults) {
                 (Err(fault), Some(faults)) if fine < self.level && is_damage(&fault) => {
-                    let coarser = relief::read_coarser(source, fine, piece, scratch)?;
+                    let coarser = relief::read_coarser(source, fine, piece, day, scratch)?;
                     faults.push(fault);
                     coarser
                 }
@@ -307,6 +341,9 @@ impl Window {
             let [x, z] = self.light_slot_of(piece.x0, piece.z0);
             let first = (z * self.light_n + x) as usize;
             copy_rows(&scratch.texels, &mut self.light[first..], piece, self.light_n);
+            if day {
+                copy_rows(&scratch.days, &mut self.day[first..], piece, self.light_n);
+            }
         }
         for (k, (a, b)) in patches.cells().enumerate() {
             let bounds = if wants_bounds {
@@ -409,6 +446,8 @@ pub(super) struct Scratch {
     pub(super) shares: Vec<crate::levels::LightSample>,
     pub(super) texels: Vec<LightTexel>,
     pub(super) rows: relief::Rows,
+    pub(super) day_samples: Vec<DaySample>,
+    pub(super) days: Vec<DayTexel>,
 }
 
 /// Copies a rectangle's rows into the rows of a square of `n` slots, from its first slot on.

@@ -24,6 +24,9 @@ pub struct RendererOptions {
     pub view_mode: ViewMode,
     /// Whether the terrain has traced light ([`crate::Clipmap::has_light`]); else light follows from slopes and sun.
     pub traced_light: bool,
+    /// Whether light is that of a day at the time of [`super::ViewTextures::set_time_of_day`]
+    /// ([`crate::Clipmap::has_day`]); else the light of the terrain's one sun.
+    pub day: bool,
     /// Whether the ground is tinted by height and slope.
     pub tint: bool,
     /// Whether air lies between ground and eye.
@@ -77,6 +80,7 @@ impl Default for RendererOptions {
             sample_count: 1,
             view_mode: ViewMode::Shaded,
             traced_light: true,
+            day: false,
             tint: true,
             haze: true,
             surface: None,

@@ -235,6 +235,7 @@ fn pipeline(
     let constants = [
         ("MORPHS", on(morphs)),
         ("TRACED_LIGHT", on(options.traced_light)),
+        ("DAY", on(options.day && options.traced_light)),
         ("TINT", on(options.tint)),
         ("HAZE", on(options.haze)),
         ("ENCODE_SRGB", on(options.encodes_srgb())),

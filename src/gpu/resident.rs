@@ -44,7 +44,9 @@ impl Resident {
         sampler: &wgpu::Sampler,
         ring: &Ring,
         levels: u32,
+        day: bool,
     ) -> Self {
+        let light_layers = levels * (1 + u32::from(day));
         let layers = |label, side, format| layers(device, label, side, levels, format);
         let heights = layers("clipscape heights", ring.clip_size, wgpu::TextureFormat::R32Float);
         let corners = Corners {
@@ -55,9 +57,11 @@ impl Resident {
             ),
             generations: vec![None; levels as usize],
         };
-        let light = layers(
+        let light = self::layers(
+            device,
             "clipscape light",
             ring.light_size(),
+            light_layers,
             wgpu::TextureFormat::Rgba16Float,
         );
         let uniform = |label, size: usize| {
@@ -215,6 +219,22 @@ impl Resident {
             |k, mut out| {
                 let first = (z as usize + k) * n + x as usize;
                 out.copy_from_slice(bytemuck::cast_slice(&window.light()[first..first + width]));
+            },
+        )?;
+        report.uploads += 1;
+        report.bytes += rect.area() as u64 * LIGHT_BYTES;
+        if window.day().is_empty() {
+            return Ok(());
+        }
+        // Light over a day stands in the layers behind.
+        let layer = self.light.depth_or_array_layers() / 2 + window.level();
+        upload.texture(
+            &self.light,
+            place(layer, [x, z], rect),
+            LIGHT_BYTES as u32,
+            |k, mut out| {
+                let first = (z as usize + k) * n + x as usize;
+                out.copy_from_slice(bytemuck::cast_slice(&window.day()[first..first + width]));
             },
         )?;
         report.uploads += 1;

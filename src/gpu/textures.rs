@@ -5,7 +5,7 @@ use super::resident::{Resident, UploadReport};
 use super::staging::Staging;
 use crate::clipmap::{Clipmap, Ring};
 use crate::error::{Error, ErrorKind, Result};
-use crate::light::Sun;
+use crate::light::{Day, Sun};
 use crate::shade::ShadeConstants;
 
 /// An update of a clipmap.
@@ -38,6 +38,9 @@ pub struct ViewTextures {
     /// The update that was recorded last; none where the textures' contents are unknown.
     recorded: Option<Update>,
     sun: Sun,
+    /// Whether there is room for light over a day, and its time.
+    day: bool,
+    time_of_day: f64,
 }
 
 impl ViewTextures {
@@ -56,7 +59,11 @@ impl ViewTextures {
                 ring.light_size() as u32,
                 limits.max_texture_dimension_2d,
             ),
-            ("layers of a texture", levels, limits.max_texture_array_layers),
+            (
+                "layers of a texture",
+                levels * (1 + u32::from(clipmap.has_day())),
+                limits.max_texture_array_layers,
+            ),
         ] {
             if needed > provided {
                 let what = format!("needs {needed} {what}, the device has {provided}");
@@ -66,10 +73,12 @@ impl ViewTextures {
         Ok(Self {
             ring,
             levels,
-            resident: Resident::new(device, layout, sampler, &ring, levels),
+            resident: Resident::new(device, layout, sampler, &ring, levels, clipmap.has_day()),
             staging: Staging::new(device),
             recorded: None,
             sun,
+            day: clipmap.has_day(),
+            time_of_day: 0.0,
         })
     }
 
@@ -79,12 +88,24 @@ impl ViewTextures {
         self.sun = sun;
     }
 
+    /// Sets the time of `day` whose light is shown, -1 to 1 (see [`Day::time_of_hour`]), and the sun of that time, from the
+    /// next upload on.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] for a time of other than finite numbers.
+    pub fn set_time_of_day(&mut self, day: &Day, time: f64) -> Result<()> {
+        self.sun = day.sun(time)?;
+        self.time_of_day = time;
+        Ok(())
+    }
+
     /// The height texture: R32Float, clip size squared, a layer per level.
     pub fn heights(&self) -> &wgpu::Texture {
         &self.resident.heights
     }
 
-    /// The light texture: Rgba16Float, twice the clip size squared, a layer per level.
+    /// The light texture: Rgba16Float, twice the clip size squared, a layer per level; where light over a day is held, as
+    /// many layers of that behind them.
     pub fn light(&self) -> &wgpu::Texture {
         &self.resident.light
     }
@@ -113,13 +134,14 @@ impl ViewTextures {
         if before.is_none_or(|before| before.clipmap != now.clipmap) {
             self.resident.forget();
         }
-        let shade = ShadeConstants::new(
+        let mut shade = ShadeConstants::new(
             &self.sun,
             clipmap.height_range_m(),
             clipmap.grid().base_m,
             clipmap.vertical_scale(),
             clipmap.view_constants().eye_height_m[0],
         );
+        shade.day_time = self.time_of_day as f32;
         let mut upload = self.staging.begin(encoder);
         let recorded = if before == Some(now) {
             self.resident
@@ -176,6 +198,12 @@ impl ViewTextures {
                 Error::new(ErrorKind::Misuse, "clipmap", "has not been updated yet")
                     .advice("update it before uploading"),
             );
+        }
+        if [self.day, options.day] != [clipmap.has_day(); 2] {
+            let what = "light over a day is drawn, or held, by one of pipelines, textures and clipmap alone";
+            return Err(Error::new(ErrorKind::Misuse, "textures", what).advice(
+                "set RendererOptions::day as Clipmap::has_day says, and make textures from that clipmap",
+            ));
         }
         options.check_view(clipmap)
     }

@@ -94,7 +94,7 @@ impl Earth {
     }
 
     /// A true azimuth as the grid has it.
-    pub(super) fn on_grid_deg(&self, azimuth_deg: f64) -> f64 {
+    pub(crate) fn on_grid_deg(&self, azimuth_deg: f64) -> f64 {
         azimuth_deg - self.grid_north_deg
     }
 }

@@ -18,6 +18,7 @@ use crate::pyramid::{Filter, downsample};
 use crate::work::Work;
 
 mod crests;
+mod day;
 mod earth;
 mod fill;
 mod horizon;
@@ -30,6 +31,10 @@ mod sun;
 mod sun_at;
 
 pub use crests::{CREST, Crests};
+pub(crate) use day::disc_coefficients;
+pub use day::{
+    DAY_POSITIONS, Day, DayTrace, SunTime, day_levels, disc, disc_integral, sun_of_day, trace_day,
+};
 pub use earth::{DEFAULT_REFRACTION, Earth, middle};
 pub use fill::fill_voids;
 pub use horizon::{horizon_tangents, horizon_tangents_on};

@@ -4,6 +4,7 @@
 //! 2004 (within 0.0003 degrees), as the crate solar-positioning has it. What is given is the sun as it is seen: raised by
 //! the air's refraction at 1010 hPa and 10 degrees (0.5 degrees at the horizon, 0.24 at 3 degrees).
 
+use std::fmt;
 use std::str::FromStr;
 
 use solar_positioning::time::JulianDate;
@@ -17,6 +18,29 @@ use crate::error::Result;
 pub struct Moment {
     /// Days since noon of the first of January 4713 B.C. (UT).
     julian_date: JulianDate,
+}
+
+impl fmt::Display for Moment {
+    /// To the second, UT. The civil date by the algorithm of H. F. Fliegel and T. C. Van Flandern, A machine algorithm for
+    /// processing calendar dates, Communications of the ACM 11, 1968 (Gregorian).
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let seconds = ((self.julian()[0] + 0.5) * 86_400.0).round() as i64;
+        let (days, rest) = (seconds.div_euclid(86_400), seconds.rem_euclid(86_400));
+        let mut l = days + 68_569;
+        let n = 4 * l / 146_097;
+        l -= (146_097 * n + 3) / 4;
+        let i = 4000 * (l + 1) / 1_461_001;
+        l = l - 1461 * i / 4 + 31;
+        let j = 80 * l / 2447;
+        let day = l - 2447 * j / 80;
+        let month = j + 2 - 12 * (j / 11);
+        let year = 100 * (n - 49) + i + j / 11;
+        let (hour, minute, second) = (rest / 3600, rest / 60 % 60, rest % 60);
+        write!(
+            f,
+            "{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z"
+        )
+    }
 }
 
 impl FromStr for Moment {
@@ -79,6 +103,38 @@ impl FromStr for Moment {
         Ok(Self {
             julian_date: julian_date.map_err(|e| e.to_string())?,
         })
+    }
+}
+
+impl Moment {
+    /// The moment `seconds` later.
+    #[must_use]
+    pub fn later(self, seconds: f64) -> Self {
+        let [days, late_s] = self.julian();
+        Self::of_julian([days + seconds / 86_400.0, late_s]).unwrap_or(self)
+    }
+
+    /// Seconds from `other` to this moment.
+    pub fn seconds_since(self, other: Self) -> f64 {
+        (self.julian()[0] - other.julian()[0]) * 86_400.0
+    }
+
+    /// Seconds since midnight, UT.
+    pub(super) fn utc_s_of_day(self) -> f64 {
+        // Julian days begin at noon.
+        (self.julian()[0] + 0.5).rem_euclid(1.0) * 86_400.0
+    }
+
+    /// Days since noon of the first of January 4713 B.C. (UT), and terrestrial time less UT in seconds.
+    pub(super) fn julian(self) -> [f64; 2] {
+        [self.julian_date.julian_date(), self.julian_date.delta_t()]
+    }
+
+    /// The inverse of [`Moment::julian`]; none where there is no such time.
+    pub(super) fn of_julian([days, late_s]: [f64; 2]) -> Option<Self> {
+        JulianDate::new(days, late_s)
+            .ok()
+            .map(|julian_date| Self { julian_date })
     }
 }
 

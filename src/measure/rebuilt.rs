@@ -60,9 +60,9 @@ pub fn rebuilt<'a>(
             arrived(terrain.light(0, rect, &mut light[from..from + rect.area() as usize])?)?;
         }
     }
-    // The step of which a file's levels above 0 are multiples is 1/64 of the DEM's own.
+    // A step of which rounding makes that of the file's own levels above 0.
     let step_m = match terrain.origin() {
-        Origin::File(meta) => meta.rounding_step_m.map(|step| 64.0 * step),
+        Origin::File(meta) => meta.rounding_step_m.map(|step| 4.0 * step),
         Origin::Dem(description) => description.step_m,
     };
     let mut all: Vec<(FilterKind, Box<dyn Levels>)> = Vec::new();

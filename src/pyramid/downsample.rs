@@ -42,12 +42,16 @@ const BLOCK: usize = 512;
 /// free on both sides.
 const GREATEST: f64 = f32::MAX.next_down() as f64;
 
-/// 1/64 of the greatest power of two not above `step_m`: what levels above 0 of an integer DEM with heights
+/// 1/4 of the greatest power of two not above `step_m`: what levels above 0 of an integer DEM with heights
 /// in multiples of `step_m` are rounded to. `step_m` must be finite, above 0 and not subnormal.
+///
+/// The mean of two such heights is still exact. Level 1's samples are two of level 0's apart, so its slopes come in an
+/// eighth of the steps of level 0's own, those of coarser levels in finer ones yet. Each bit less is worth 3 to 4 MB of a
+/// file of the Sierra (13201 x 4801 whole metres): 1/64 takes 47 MB above level 0, 1/8 31 MB, 1/4 27 MB.
 pub fn rounding_step(step_m: f64) -> Option<f64> {
     // Clearing the fraction's bits leaves the power of two.
     let power = f64::from_bits(step_m.to_bits() & 0x7ff0_0000_0000_0000);
-    (step_m.is_normal() && step_m > 0.0).then_some(power / 64.0)
+    (step_m.is_normal() && step_m > 0.0).then_some(power / 4.0)
 }
 
 /// The level of `size.level(1)` samples, row by row, that `filter` makes of `fine`, a level of `size` samples,

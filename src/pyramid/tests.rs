@@ -284,12 +284,12 @@ fn rounded_levels_are_multiples_and_the_next_level_follows_from_them() {
         .collect();
     let filter = Filter::default();
     let made = Pyramid::new(grid, heights, Some(1.0), &filter, &Serial, &Silent).unwrap();
-    assert_eq!(made.rounding_step_m(), Some(1.0 / 64.0));
+    assert_eq!(made.rounding_step_m(), Some(1.0 / 4.0));
     for level in 1..grid.file_levels() {
         assert!(
             made.level(level)
                 .iter()
-                .all(|h| h.is_nan() || (h * 64.0).fract() == 0.0),
+                .all(|h| h.is_nan() || (h * 4.0).fract() == 0.0),
             "level {level}"
         );
     }
@@ -304,8 +304,8 @@ fn rounded_levels_are_multiples_and_the_next_level_follows_from_them() {
     .unwrap();
     let bits = |level: &[f32]| level.iter().map(|h| h.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(&again), bits(made.level(2)));
-    assert_eq!(rounding_step(0.1), Some(0.0625 / 64.0));
-    assert_eq!(rounding_step(3.0), Some(2.0 / 64.0));
+    assert_eq!(rounding_step(0.1), Some(0.0625 / 4.0));
+    assert_eq!(rounding_step(3.0), Some(2.0 / 4.0));
     assert!(
         [0.0, -1.0, f64::NAN, f64::INFINITY]
             .iter()

@@ -7,7 +7,7 @@
 //!
 //! Points are world metres, x east, y up, z south, heights with the DEM's base and before vertical scale. All is f64;
 //! positions are taken from a query's own place, so that large indices cost nothing. [`cast`](ray) says how a ray
-//! meets the surface. [`collider`] copies the heights of a rectangle for a physics engine.
+//! meets the surface. [`lit_at`] asks how much of the sun a point sees. [`collider`] copies the heights of a rectangle for a physics engine.
 //!
 //! [`Levels`]: crate::levels::Levels
 
@@ -15,6 +15,7 @@ mod collider;
 mod drawn;
 mod ground;
 mod line;
+mod lit;
 mod places;
 mod quad;
 pub mod ray;
@@ -27,6 +28,7 @@ mod walk;
 use glam::DVec3;
 
 pub use collider::{Collider, MAX_COLLIDER_SAMPLES, collider};
+pub use lit::lit_at;
 pub use places::Places;
 pub use quad::{Quad, Triangle};
 pub use ray::Crossing;

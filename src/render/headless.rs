@@ -13,7 +13,7 @@ use crate::gpu::{
     ClipmapRenderer, DrawReport, Gpu, RendererOptions, SkyRenderer, UploadReport, ViewTextures, read,
 };
 use crate::levels::Levels;
-use crate::light::Sun;
+use crate::light::{Day, Sun};
 use crate::shade::ViewMode;
 
 /// The colour format drawn into: 8 bits a channel, sRGB.
@@ -83,6 +83,7 @@ pub struct Headless {
     measuring: Option<MeasuringPass>,
     pool: Option<ErrorPool>,
     truth: Option<Arc<dyn Levels>>,
+    day: Option<Day>,
     frames: u64,
 }
 
@@ -120,7 +121,7 @@ impl Headless {
     pub fn new(gpu: Gpu, levels: &dyn Levels, options: &HeadlessOptions) -> Result<Self> {
         check_picture(options.size_px)?;
         let clipmap = Clipmap::new(levels, &options.clipmap)?;
-        let renderer_options = renderer_options(options, clipmap.has_light());
+        let renderer_options = renderer_options(options, &clipmap);
         let renderer = ClipmapRenderer::new(&gpu.device, &renderer_options)?;
         let textures = renderer.textures(&gpu.device, &clipmap, options.sun)?;
         Ok(Self {
@@ -134,6 +135,7 @@ impl Headless {
                 .transpose()?,
             pool: None,
             truth: None,
+            day: None,
             frames: 0,
             gpu,
             options: *options,
@@ -206,7 +208,7 @@ impl Headless {
 
     /// Where light has come that was traced meanwhile, or gone, other pipelines draw it.
     fn follow_light(&mut self) -> Result<()> {
-        let wanted = renderer_options(&self.options, self.clipmap.has_light());
+        let wanted = renderer_options(&self.options, &self.clipmap);
         if wanted.traced_light != self.renderer.options().traced_light {
             self.renderer = ClipmapRenderer::new(&self.gpu.device, &wanted)?;
             self.sky = SkyRenderer::new(&self.gpu.device, &wanted)?;
@@ -215,6 +217,37 @@ impl Headless {
                 .textures(&self.gpu.device, &self.clipmap, self.options.sun)?;
         }
         Ok(())
+    }
+
+    /// Shows the light of `day`, the terrain's, from now on: at noon, until [`Headless::set_time_of_day`].
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] where the clipmap holds no light over a day.
+    pub fn set_day(&mut self, day: Day) -> Result<()> {
+        if !self.clipmap.has_day() {
+            let what = "the frames' clipmap holds no light over a day";
+            return Err(Error::new(ErrorKind::Misuse, "day", what)
+                .advice("preprocess the terrain with --day N, and set ClipmapOptions::day"));
+        }
+        self.day = Some(day);
+        self.set_time_of_day(0.0)
+    }
+
+    /// Sets the time of the day whose light is shown, -1 to 1, see [`Day::time_of_hour`].
+    ///
+    /// # Errors
+    /// [`ErrorKind::Misuse`] where no day is shown, and for a time of other than finite numbers.
+    pub fn set_time_of_day(&mut self, time: f64) -> Result<()> {
+        let day = self.day.ok_or_else(|| {
+            Error::new(ErrorKind::Misuse, "time of day", "no light over a day is shown")
+                .advice("render terrain that was preprocessed with --day N")
+        })?;
+        self.textures.set_time_of_day(&day, time)
+    }
+
+    /// The day whose light is shown.
+    pub fn day(&self) -> Option<&Day> {
+        self.day.as_ref()
     }
 
     /// What frames are measured against, where that is not the levels that they are drawn from: those do not wait.
@@ -372,12 +405,13 @@ impl Headless {
 }
 
 /// How the pipelines of frames are made, with traced light or without.
-fn renderer_options(options: &HeadlessOptions, has_light: bool) -> RendererOptions {
+fn renderer_options(options: &HeadlessOptions, clipmap: &Clipmap) -> RendererOptions {
     RendererOptions {
         colour_format: COLOUR_FORMAT,
         sample_count: options.sample_count,
         view_mode: options.view_mode,
-        traced_light: options.traced_light && has_light,
+        traced_light: options.traced_light && clipmap.has_light(),
+        day: clipmap.has_day(),
         tint: options.tint,
         haze: options.haze,
         ..Default::default()

@@ -78,6 +78,10 @@ impl Recording {
                 return Err(Error::cancelled(self.folder.display()));
             }
             let camera = flight.camera_at_frame(k);
+            if let Some(hour) = flight.sun_hour_at(flight.time_of_frame_s(k)) {
+                let time = headless.day().map_or(0.0, |day| day.time_of_hour(hour));
+                headless.set_time_of_day(time)?;
+            }
             let frame = headless.frame(levels, &camera, flight.time_of_frame_s(k))?;
             write_png(&self.picture(k), width, height, &frame.rgba8)?;
             if let Some(sheet) = sheet.as_mut().filter(|s| s.wants(k - frames.start)) {

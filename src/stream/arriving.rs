@@ -7,7 +7,7 @@ use super::stage::{Current, Stage};
 use super::tiles::Patience;
 use crate::error::Result;
 use crate::grid::{Grid, Rect};
-use crate::levels::{Arrival, Bounds, Data, Levels, LightSample, Wanted};
+use crate::levels::{Arrival, Bounds, Data, DaySample, Levels, LightSample, Wanted};
 
 /// Numbers views, so that each has wants of its own.
 static VIEWS: AtomicU64 = AtomicU64::new(1);
@@ -91,6 +91,18 @@ impl Levels for Arriving {
         match tiles {
             Some(tiles) if levels.has_light() => tiles.copy(Data::Light, level, rect, out, Patience::None),
             _ => levels.light(level, rect, out),
+        }
+    }
+
+    fn has_day(&self) -> bool {
+        self.stage().levels.has_day()
+    }
+
+    fn day(&self, level: u32, rect: Rect, out: &mut [DaySample]) -> Result<Arrival> {
+        let Stage { levels, tiles, .. } = self.stage();
+        match tiles {
+            Some(tiles) if levels.has_day() => tiles.copy(Data::Day, level, rect, out, Patience::None),
+            _ => levels.day(level, rect, out),
         }
     }
 

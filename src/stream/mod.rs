@@ -37,8 +37,8 @@ use self::stage::{Current, Stage};
 use self::tiles::Patience;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
-use crate::levels::{Arrival, Bounds, Data, Levels, LightSample, Wanted};
-use crate::light::Sun;
+use crate::levels::{Arrival, Bounds, Data, DaySample, Levels, LightSample, Wanted};
+use crate::light::{Day, Sun};
 use crate::progress::Progress;
 use crate::pyramid::Filter;
 use crate::source::{self, Description, Georeference, HeightSource, OpenOptions, ReadAt, Synth};
@@ -310,6 +310,14 @@ impl Terrain {
             Origin::Dem(_) => None,
         }
     }
+
+    /// The day whose light there is, where there is one.
+    pub fn day(&self) -> Option<Day> {
+        match &self.origin {
+            Origin::File(meta) => meta.day,
+            Origin::Dem(_) => None,
+        }
+    }
 }
 
 impl Levels for Terrain {
@@ -348,6 +356,18 @@ impl Levels for Terrain {
                 tiles.copy(Data::Light, level, rect, out, Patience::Retry)
             }
             _ => stage.levels.light(level, rect, out),
+        }
+    }
+
+    fn has_day(&self) -> bool {
+        self.current.get().1.levels.has_day()
+    }
+
+    fn day(&self, level: u32, rect: Rect, out: &mut [DaySample]) -> Result<Arrival> {
+        let (_, stage) = self.current.get();
+        match stage.shared_tiles() {
+            Some(tiles) if stage.levels.has_day() => tiles.copy(Data::Day, level, rect, out, Patience::Retry),
+            _ => stage.levels.day(level, rect, out),
         }
     }
 

@@ -9,7 +9,9 @@
 //! `sum over l of (N' c_h + 4N' (c_h + c_l) + N'/64 c_b) / (dx 2^l)`, N' with what tiles add to each,
 //!
 //! and as many loaders as there are share it. An upload budget allows `budget fps` bytes a second, of 4 a height and 8 for
-//! each of 4 light texels over a sample. The smaller of the two speeds is the fastest at which every level stays fresh.
+//! each of 4 light texels over a sample. And what is read must have been wanted before: a view wants what windows will gain
+//! in some seconds, but not of a window that the eye leaves in that time, so the finest level is loaded in time up to
+//! `N dx` in these seconds. The smallest of the three speeds is the fastest at which every level stays fresh.
 
 use super::shape::Shape;
 use crate::grid::PATCH;
@@ -19,8 +21,8 @@ use crate::levels::Data;
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     pub(super) shape: Shape,
-    /// Seconds of a loader a sample: heights, bounds of a patch, light.
-    pub(super) sample_s: [f64; 3],
+    /// Seconds of a loader a sample: heights, bounds of a patch, light, light over a day.
+    pub(super) sample_s: [f64; 4],
     pub(super) loaders: usize,
 }
 
@@ -35,6 +37,8 @@ pub struct Flown {
     pub upload_budget_bytes: Option<u64>,
     /// Frames a second.
     pub fps: f64,
+    /// Seconds for which what windows will gain is wanted beforehand.
+    pub ahead_s: f64,
 }
 
 impl Pace {
@@ -42,21 +46,23 @@ impl Pace {
     pub fn fastest_m_s(&self, flown: &Flown) -> f64 {
         let n = flown.clip_size as f64;
         let whole = |n: f64, data: Data| n + (self.shape.side(data) - 1) as f64;
-        let [heights_s, bounds_s, light_s] = self.sample_s;
+        let [heights_s, bounds_s, light_s, day_s] = self.sample_s;
         let heights = |n: f64| whole(n, Data::Heights);
         let step_s = heights(n) * heights_s
-            + 2.0 * heights(2.0 * n) * (heights_s + light_s)
+            + 2.0 * heights(2.0 * n) * (heights_s + light_s + day_s)
             + whole(n / PATCH as f64, Data::Bounds) / PATCH as f64 * bounds_s;
-        let step_bytes = n * (4.0 + 4.0 * 8.0);
+        let light_bytes = if day_s > 0.0 { 16.0 } else { 8.0 };
+        let step_bytes = n * (4.0 + 4.0 * light_bytes);
         let spacing_m = self.shape.grid.spacing_m;
+        let finest_m = spacing_m[0].min(spacing_m[1]);
         let steps_a_metre: f64 = (0..flown.levels)
-            .map(|l| 1.0 / (spacing_m[0].min(spacing_m[1]) * (1i64 << l) as f64))
+            .map(|l| 1.0 / (finest_m * (1i64 << l) as f64))
             .sum();
         let loaded = self.loaders as f64 / (step_s * steps_a_metre);
         let uploaded = flown.upload_budget_bytes.map_or(f64::INFINITY, |bytes| {
             bytes as f64 * flown.fps / (step_bytes * steps_a_metre)
         });
-        loaded.min(uploaded)
+        loaded.min(uploaded).min(n * finest_m / flown.ahead_s)
     }
 }
 
@@ -66,14 +72,14 @@ mod tests {
     use crate::grid::Grid;
 
     #[test]
-    fn the_slower_of_loading_and_uploading_decides() {
+    fn the_slowest_of_loading_uploading_and_wanting_decides() {
         let pace = |sample_s: f64, loaders| Pace {
             shape: Shape {
                 grid: Grid::new(5000, 5000, [10.0, 20.0]),
                 levels: 8,
                 bounds_side: 256,
             },
-            sample_s: [sample_s, 0.0, 0.0],
+            sample_s: [sample_s, 0.0, 0.0, 0.0],
             loaders,
         };
         let flown = |budget| Flown {
@@ -81,6 +87,7 @@ mod tests {
             levels: 1,
             upload_budget_bytes: budget,
             fps: 30.0,
+            ahead_s: 0.0,
         };
         // A step of 10 m reads 511 samples of the level and 2 x 767 of the finer one.
         let want = 10.0 / ((511.0 + 2.0 * 767.0) * 1e-6);
@@ -95,5 +102,11 @@ mod tests {
         };
         let [one, two] = [1, 2].map(|l| pace(1e-6, 1).fastest_m_s(&levels(l)));
         assert!((one / two - 1.5).abs() < 1e-9);
+        // A window of 2560 m is left in half a second.
+        let ahead = Flown {
+            ahead_s: 0.5,
+            ..flown(None)
+        };
+        assert_eq!(pace(1e-9, 1).fastest_m_s(&ahead), 5120.0);
     }
 }

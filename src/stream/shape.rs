@@ -2,7 +2,7 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect, Size};
-use crate::levels::{Bounds, Data};
+use crate::levels::{Bounds, Data, DaySample};
 
 /// Samples along a side of a tile of heights or light: that of a terrain file's tiles.
 const SIDE: i64 = crate::terrain::layout::TILE;
@@ -39,7 +39,7 @@ impl Shape {
     pub(super) fn size(&self, data: Data, level: u32) -> Size {
         match data {
             Data::Bounds => self.grid.patches(level),
-            Data::Heights | Data::Light => self.grid.level(level),
+            Data::Heights | Data::Light | Data::Day => self.grid.level(level),
         }
     }
 
@@ -88,6 +88,7 @@ pub(super) fn words_per_sample(data: Data) -> usize {
     match data {
         Data::Bounds => size_of::<Bounds>() / 4,
         Data::Heights | Data::Light => 1,
+        Data::Day => size_of::<DaySample>() / 4,
     }
 }
 
@@ -120,7 +121,12 @@ mod tests {
             levels: 5,
             bounds_side: 32,
         };
-        for (data, level) in [(Data::Heights, 0), (Data::Bounds, 0), (Data::Light, 1)] {
+        for (data, level) in [
+            (Data::Heights, 0),
+            (Data::Bounds, 0),
+            (Data::Light, 1),
+            (Data::Day, 1),
+        ] {
             let size = shape.size(data, level);
             let rect = Rect::new(5, 3, size.width - 1, size.height);
             let words = words_per_sample(data);

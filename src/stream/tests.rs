@@ -9,7 +9,7 @@ use super::tiles::{Patience, Tiles};
 use super::{Arriving, LEAST_TILE_BYTES, Terrain, TileOptions};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
-use crate::levels::{Arrival, Bounds, Data, Levels, LightSample, Wanted};
+use crate::levels::{Arrival, Bounds, Data, DaySample, Levels, LightSample, Wanted};
 use crate::progress::Silent;
 use crate::terrain::testing::{Arrays, Look, Random, all_bits};
 
@@ -70,6 +70,15 @@ impl Levels for Counted {
         self.count(Data::Light, level, rect)?;
         self.arrays.light(level, rect, out)
     }
+
+    fn has_day(&self) -> bool {
+        self.arrays.has_day()
+    }
+
+    fn day(&self, level: u32, rect: Rect, out: &mut [DaySample]) -> Result<Arrival> {
+        self.count(Data::Day, level, rect)?;
+        self.arrays.day(level, rect, out)
+    }
 }
 
 fn options(loaders: usize) -> TileOptions {
@@ -99,6 +108,7 @@ fn everything(levels: &dyn Levels) -> Vec<Wanted> {
             want(Data::Bounds, grid.patches(level).rect()),
             want(Data::Heights, grid.level(level).rect()),
             want(Data::Light, grid.level(level).rect()),
+            want(Data::Day, grid.level(level).rect()),
         ]
     };
     (0..levels.level_count()).rev().flat_map(of).collect()

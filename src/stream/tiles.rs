@@ -41,7 +41,7 @@ struct Shared {
     /// A tile has come, or cannot be had.
     done: Condvar,
     /// By kind of data: samples that were loaded, and the nanoseconds that it took.
-    loaded: [(AtomicU64, AtomicU64); 3],
+    loaded: [(AtomicU64, AtomicU64); 4],
 }
 
 impl Tiles {
@@ -257,6 +257,9 @@ impl Shared {
             Data::Light => self
                 .source
                 .light(key.level, rect, bytemuck::cast_slice_mut(&mut words)),
+            Data::Day => self
+                .source
+                .day(key.level, rect, bytemuck::cast_slice_mut(&mut words)),
         };
         match arrival? {
             Arrival::Arrived => Ok(Arc::new(words)),

@@ -192,7 +192,7 @@ fn a_plain_height_image_is_not_a_terrain_file() {
 fn headers_with_other_sizes_than_the_rules_say_are_refused() {
     let arrays = Arrays::random(300, 70, false, Look::Smooth, 14);
     let description = meta(arrays.grid, false);
-    let layout = Layout::new(&arrays.grid, false).unwrap();
+    let layout = Layout::new(&arrays.grid, false, false).unwrap();
     let with = |change: &dyn Fn(&mut exr::meta::MetaData)| {
         let mut exr = header::describe(&layout);
         change(&mut exr);
@@ -228,7 +228,7 @@ fn headers_with_other_sizes_than_the_rules_say_are_refused() {
     refused("display window", &|m| m.headers[0].layer_size = Vec2(299, 70));
     // A header that promises more than the file can hold is refused before anything is allocated for it.
     let grid = Grid::new(1 << 20, 1 << 20, [1.0, 1.0]);
-    let huge = header::describe(&Layout::new(&grid, false).unwrap());
+    let huge = header::describe(&Layout::new(&grid, false, false).unwrap());
     let mut bytes = header::to_bytes(&meta(grid, false), &huge).unwrap();
     bytes.resize(bytes.len() + 1000, 0);
     assert!(open(bytes).err().unwrap().to_string().contains("ends too early"));

@@ -151,7 +151,7 @@ pub(super) fn read(name: &str, bytes: Arc<dyn ReadAt>) -> Result<(Meta, Layout, 
         height: side(height)?,
     };
     let meta = Meta::from_attributes(&attributes, size).map_err(broken)?;
-    let layout = Layout::new(&meta.grid, meta.light.is_some()).map_err(broken)?;
+    let layout = Layout::new(&meta.grid, meta.light.is_some(), meta.day.is_some()).map_err(broken)?;
     compare(&exr, &layout).map_err(broken)?;
     // Each tile takes 8 bytes of table, 24 of coordinates and length, and a byte of data at the least.
     let least = layout.tile_count().saturating_mul(33).saturating_add(input.count);

@@ -5,7 +5,9 @@
 //! | `height.0` ... | `Y` f32 | samples of the level |
 //! | `bounds.0` ... | `error`, `max`, `min`, `need_error`, `need_max`, `need_min` f32 | patches of the level |
 //! | `light.0` ... (where there is light) | `sky`, `sun` f16 | samples of the level |
+//! | `day.0` ... (where there is a day) | `first`, `first_soft`, `last`, `last_soft`, `slope` f16 | samples of the level |
 //! | `check.0` ... | `height`, `light` u32 | tiles of `height.N`; `light` is 0 without light |
+//! | `check.day.0` ... (where there is a day) | `day` u32 | tiles of `day.N` |
 //! | `check.bounds` | `bounds` u32 | row N: the tiles of `bounds.N`, row by row; cells beyond them are 0 |
 //!
 //! Parts stand in the order of this table, each kind from the finest level to the coarsest. All are tiled
@@ -16,8 +18,8 @@
 //! by row, in each row channel by channel in alphabetical order, samples little-endian, the tile cut at the
 //! part's edge.
 //!
-//! *Order of tiles.* Heights first, then bounds, light, checks and `check.bounds`: each kind is made in a pass of its
-//! own over what stands before it. Heights, bounds and light stand in the order of the rows of level 0 that a pass from
+//! *Order of tiles.* Heights first, then bounds, light, the day, checks and `check.bounds`: each kind is made in a pass of its
+//! own over what stands before it. Heights, bounds, light and day stand in the order of the rows of level 0 that a pass from
 //! north to south must have seen ([`TileRow::seen`]); where equal the finer level first; within a row of tiles from
 //! west to east. So one pass can write every tile as soon as that many rows were seen, and hold few of them.
 
@@ -49,8 +51,12 @@ pub enum Kind {
     Bounds,
     /// Light of a level.
     Light,
+    /// Light over a day of a level.
+    Day,
     /// Checks of the tiles of a level's heights and light.
     Check,
+    /// Checks of the tiles of a level's light over a day.
+    CheckDay,
     /// Checks of the tiles of all levels' bounds.
     CheckBounds,
 }
@@ -73,7 +79,9 @@ impl Part {
             Kind::Height => format!("height.{}", self.level),
             Kind::Bounds => format!("bounds.{}", self.level),
             Kind::Light => format!("light.{}", self.level),
+            Kind::Day => format!("day.{}", self.level),
             Kind::Check => format!("check.{}", self.level),
+            Kind::CheckDay => format!("check.day.{}", self.level),
             Kind::CheckBounds => "check.bounds".into(),
         }
     }
@@ -87,7 +95,12 @@ impl Part {
                 SampleType::F32,
             ),
             Kind::Light => (&["sky", "sun"], SampleType::F16),
+            Kind::Day => (
+                &["first", "first_soft", "last", "last_soft", "slope"],
+                SampleType::F16,
+            ),
             Kind::Check => (&["height", "light"], SampleType::U32),
+            Kind::CheckDay => (&["day"], SampleType::U32),
             Kind::CheckBounds => (&["bounds"], SampleType::U32),
         }
     }
@@ -137,11 +150,12 @@ pub struct Layout {
     parts: Vec<Part>,
     levels: u32,
     light: bool,
+    day: bool,
 }
 
 impl Layout {
-    /// The parts for a DEM of `grid`, with light or without; else what is wrong with the grid, as a phrase.
-    pub fn new(grid: &Grid, light: bool) -> Result<Self, String> {
+    /// The parts for a DEM of `grid`, with light or without, and with a day or without; else what is wrong with the grid, as a phrase.
+    pub fn new(grid: &Grid, light: bool, day: bool) -> Result<Self, String> {
         grid.check()?;
         let Size { width, height } = grid.size;
         if width > MAX_SIDE || height > MAX_SIDE {
@@ -163,8 +177,14 @@ impl Layout {
         if light {
             per_level(Kind::Light, &|l| grid.level(l));
         }
+        if day {
+            per_level(Kind::Day, &|l| grid.level(l));
+        }
         let tiles_of = |kind, size| Part { kind, level: 0, size }.tiles();
         per_level(Kind::Check, &|l| tiles_of(Kind::Height, grid.level(l)));
+        if day {
+            per_level(Kind::CheckDay, &|l| tiles_of(Kind::Day, grid.level(l)));
+        }
         let bounds_tiles = tiles_of(Kind::Bounds, grid.patches(0)).samples();
         let size = Size {
             width: bounds_tiles,
@@ -185,7 +205,12 @@ impl Layout {
                 ));
             }
         }
-        Ok(Self { parts, levels, light })
+        Ok(Self {
+            parts,
+            levels,
+            light,
+            day,
+        })
     }
 
     /// All parts in the order of the file.
@@ -198,13 +223,15 @@ impl Layout {
         self.levels
     }
 
-    /// The index of the part of `kind` and `level`. Light only where there is light.
+    /// The index of the part of `kind` and `level`. Light only where there is light, a day where there is one.
     pub fn part(&self, kind: Kind, level: u32) -> usize {
         let before = match kind {
             Kind::Height => 0,
             Kind::Bounds => 1,
             Kind::Light => 2,
-            Kind::Check | Kind::CheckBounds => 2 + usize::from(self.light),
+            Kind::Day => 2 + usize::from(self.light),
+            Kind::Check | Kind::CheckBounds => 2 + usize::from(self.light) + usize::from(self.day),
+            Kind::CheckDay => 4 + usize::from(self.light),
         };
         match kind {
             Kind::CheckBounds => self.parts.len() - 1,
@@ -228,6 +255,12 @@ impl Layout {
                 y,
                 channel: 1,
             }),
+            Kind::Day => Some(Check {
+                part: self.part(Kind::CheckDay, level),
+                x,
+                y,
+                channel: 0,
+            }),
             Kind::Bounds => {
                 let x = y * self.parts[part].tiles().width + x;
                 Some(Check {
@@ -237,7 +270,7 @@ impl Layout {
                     channel: 0,
                 })
             }
-            Kind::Check | Kind::CheckBounds => None,
+            Kind::Check | Kind::CheckDay | Kind::CheckBounds => None,
         }
     }
 
@@ -254,10 +287,10 @@ impl Layout {
             for y in 0..self.parts[part].tiles().height {
                 let under = match (kind, level) {
                     (Kind::Height, 0) => (y + 1) * TILE,
-                    (Kind::Height, _) => (y + 1) * TILE + FILTER_REACH,
+                    (Kind::Height | Kind::Day, _) => (y + 1) * TILE + FILTER_REACH,
                     (Kind::Light, _) => (y + 1) * TILE + LIGHT_REACH,
                     (Kind::Bounds, _) => ((y + 1) * TILE + 1) * PATCH,
-                    (Kind::Check | Kind::CheckBounds, _) => rows,
+                    (Kind::Check | Kind::CheckDay | Kind::CheckBounds, _) => rows,
                 };
                 let seen = (under << level).min(rows);
                 order.push(TileRow { part, y, seen });
@@ -304,20 +337,23 @@ mod tests {
             (1201, 1201, false),
         ] {
             let grid = Grid::new(w, h, [1.0, 1.0]);
-            let layout = Layout::new(&grid, light).unwrap();
-            for (index, part) in layout.parts().iter().enumerate() {
-                assert_eq!(layout.part(part.kind, part.level), index, "{part:?}");
-                assert!(part.channels().0.is_sorted());
+            for day in [false, true] {
+                let layout = Layout::new(&grid, light, day).unwrap();
+                for (index, part) in layout.parts().iter().enumerate() {
+                    assert_eq!(layout.part(part.kind, part.level), index, "{part:?}");
+                    assert!(part.channels().0.is_sorted());
+                }
+                let has_light = layout.parts().iter().any(|p| p.kind == Kind::Light);
+                assert_eq!(has_light, light);
+                assert_eq!(layout.parts().iter().any(|p| p.kind == Kind::Day), day);
+                assert_eq!(layout.parts().last().unwrap().name(), "check.bounds");
             }
-            let has_light = layout.parts().iter().any(|p| p.kind == Kind::Light);
-            assert_eq!(has_light, light);
-            assert_eq!(layout.parts().last().unwrap().name(), "check.bounds");
         }
     }
 
     #[test]
     fn every_row_stands_once_and_checks_stand_after_what_they_check() {
-        let layout = Layout::new(&Grid::new(3000, 5000, [1.0, 1.0]), true).unwrap();
+        let layout = Layout::new(&Grid::new(3000, 5000, [1.0, 1.0]), true, true).unwrap();
         let order = layout.order();
         let rows: i64 = layout.parts().iter().map(|p| p.tiles().height).sum();
         assert_eq!(order.len() as i64, rows);
@@ -347,7 +383,7 @@ mod tests {
     fn rows_are_known_once_as_many_were_seen_as_the_order_says() {
         for (width, height) in [(3, 70_000), (1, 1), (1, 300), (70, 5001)] {
             let grid = Grid::new(width, height, [1.0, 1.0]);
-            let layout = Layout::new(&grid, true).unwrap();
+            let layout = Layout::new(&grid, true, true).unwrap();
             for row in layout.order() {
                 let Part { kind, level, size } = layout.parts()[row.part];
                 let beside = if kind == Kind::Light {
@@ -360,16 +396,16 @@ mod tests {
                 let mut needs = last;
                 for finer in (0..level).rev() {
                     let (reach, count) = match kind {
-                        Kind::Height | Kind::Light => (63, grid.level(finer).height),
+                        Kind::Height | Kind::Light | Kind::Day => (63, grid.level(finer).height),
                         Kind::Bounds => (2, grid.patches(finer).height),
-                        Kind::Check | Kind::CheckBounds => continue,
+                        Kind::Check | Kind::CheckDay | Kind::CheckBounds => continue,
                     };
                     needs = (2 * needs + reach).min(count - 1);
                 }
                 if kind == Kind::Bounds {
                     needs = ((needs + 1) * PATCH).min(height - 1);
                 }
-                if !matches!(kind, Kind::Check | Kind::CheckBounds) {
+                if !matches!(kind, Kind::Check | Kind::CheckDay | Kind::CheckBounds) {
                     assert!(needs < row.seen, "{width} x {height}: {row:?} needs {needs}");
                 }
             }
@@ -378,7 +414,7 @@ mod tests {
 
     #[test]
     fn grids_beyond_openexr_are_refused_without_counting_tiles_one_by_one() {
-        let layout = |w, h| Layout::new(&Grid::new(w, h, [1.0, 1.0]), true);
+        let layout = |w, h| Layout::new(&Grid::new(w, h, [1.0, 1.0]), true, true);
         assert!(layout(1 << 20, 1 << 20).is_ok());
         assert!(layout(1 << 30, 1).unwrap_err().contains("a side"));
         assert!(

@@ -13,6 +13,7 @@
 //! | `clipscape.vertical_unit` | unit of heights as read |
 //! | `clipscape.filter`, `.lobes`, `.rounding_step` | how levels above 0 were made: a name of [`crate::pyramid::FilterKind`], its kernel's reach a side in coarse samples, the step in metres |
 //! | `clipscape.sun`, `.sky_directions` | azimuth and altitude in degrees; number of directions |
+//! | `clipscape.day` | positions, half its length in seconds, latitude and longitude in degrees, Julian date of noon (UT) and terrestrial time less UT in seconds: [`Day`] |
 //! | `clipscape.source`, `.source_bytes`, `.source_modified` | name, length, seconds since 1970 |
 //! | `clipscape.tool` | program and version |
 //! | `clipscape.assumed` | what was assumed of the source, a sentence a line |
@@ -22,7 +23,7 @@ use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use crate::grid::{Grid, Size};
-use crate::light::Sun;
+use crate::light::{Day, Sun};
 use crate::source::{Georeference, Registration};
 
 /// What every attribute's name begins with.
@@ -70,6 +71,8 @@ pub struct Meta {
     pub rounding_step_m: Option<f64>,
     /// How the light was traced; the file has light exactly if this is there.
     pub light: Option<LightMeta>,
+    /// The day whose light it has beside that; the file has light over a day exactly if this is there.
+    pub day: Option<Day>,
     /// The file from which it was made.
     pub source: SourceStamp,
     /// Program and version that made it.
@@ -126,6 +129,7 @@ impl Meta {
             );
             put("sky_directions", light.sky_directions.to_string());
         }
+        put("day", self.day.map(|day| day.to_string()).unwrap_or_default());
         put("source", self.source.name.clone());
         put("source_bytes", self.source.length_bytes.to_string());
         put(
@@ -195,6 +199,7 @@ impl Meta {
             lobes: read.required("lobes")?,
             rounding_step_m: read.optional("rounding_step")?,
             light,
+            day: read.optional("day")?,
             source: SourceStamp {
                 name: read.text("source").unwrap_or_default().into(),
                 length_bytes: read.required("source_bytes")?,

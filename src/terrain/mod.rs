@@ -23,5 +23,5 @@ pub use header::is_terrain;
 pub use layout::FORMAT_VERSION;
 pub use meta::{LightMeta, Meta, SourceStamp, TOOL};
 pub use reader::{DEFAULT_CACHE_BYTES, TerrainFile};
-pub(crate) use tile::{BOUNDS_FIELDS, pack_columns, pack_light};
+pub(crate) use tile::{BOUNDS_FIELDS, DAY_FIELDS, pack_columns, pack_light};
 pub use writer::{EncodedTile, TerrainWriter, write};

@@ -12,11 +12,11 @@ use super::cache::Cache;
 use super::header;
 use super::layout::{Kind, Layout, Part};
 use super::meta::Meta;
-use super::tile::{BOUNDS_FIELDS, LIGHT_FIELDS, check, little_endian, unpack};
+use super::tile::{BOUNDS_FIELDS, DAY_FIELDS, LIGHT_FIELDS, check, little_endian, unpack};
 use super::zip;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
-use crate::levels::{Arrival, Bounds, Levels, LightSample};
+use crate::levels::{Arrival, Bounds, DaySample, Levels, LightSample};
 use crate::progress::Progress;
 use crate::source::ReadAt;
 
@@ -140,7 +140,7 @@ impl TerrainFile {
                     return Err(Error::cancelled(&self.name));
                 }
                 let checked = self.read_tile(index, x, y).and_then(|tile| match part.kind {
-                    Kind::Check | Kind::CheckBounds => self.check_unused(index, x, y, &tile),
+                    Kind::Check | Kind::CheckDay | Kind::CheckBounds => self.check_unused(index, x, y, &tile),
                     _ => Ok(()),
                 });
                 faults.extend(checked.err());
@@ -281,6 +281,7 @@ impl TerrainFile {
         let rect = description.tile_rect(x, y);
         let values = check_values(description, tile, (x, y), rect);
         let unused = |cell: (i64, i64), value: [u32; 2]| match description.kind {
+            Kind::CheckDay => false,
             Kind::Check => self.meta.light.is_none() && value[1] != 0,
             _ => {
                 let of = self.layout.part(Kind::Bounds, cell.1 as u32);
@@ -320,6 +321,9 @@ impl TerrainFile {
         }
         if kind == Kind::Light && self.meta.light.is_none() {
             return misuse("light was asked for, it has none".into());
+        }
+        if kind == Kind::Day && self.meta.day.is_none() {
+            return misuse("light over a day was asked for, it has none".into());
         }
         let part = self.layout.part(kind, level);
         let description = &self.layout.parts()[part];
@@ -446,5 +450,18 @@ impl Levels for TerrainFile {
             rect,
             bytemuck::cast_slice_mut(out),
         )
+    }
+
+    fn has_day(&self) -> bool {
+        self.meta.day.is_some()
+    }
+
+    fn day(&self, level: u32, rect: Rect, out: &mut [DaySample]) -> Result<Arrival> {
+        let mut samples = vec![[0u16; 5]; out.len()];
+        let arrival = self.copy(Kind::Day, level, DAY_FIELDS, rect, &mut samples)?;
+        for (out, [first, first_soft, last, last_soft, slope]) in out.iter_mut().zip(samples) {
+            *out = bytemuck::cast([first, first_soft, last, last_soft, slope, 0]);
+        }
+        Ok(arrival)
     }
 }

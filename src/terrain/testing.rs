@@ -8,7 +8,8 @@ use half::f16;
 use super::{LightMeta, Meta, SourceStamp, TerrainFile, write};
 use crate::error::Result;
 use crate::grid::{Grid, Rect, Size};
-use crate::levels::{Arrival, Bounds, Levels, LightSample};
+use crate::levels::{Arrival, Bounds, DaySample, Levels, LightSample};
+use crate::light::Day;
 use crate::progress::Silent;
 pub(crate) use crate::pyramid::random::Random;
 use crate::source::{Georeference, Registration};
@@ -20,6 +21,8 @@ pub(crate) struct Arrays {
     pub(crate) heights: Vec<Vec<f32>>,
     pub(crate) bounds: Vec<Vec<Bounds>>,
     pub(crate) light: Option<Vec<Vec<LightSample>>>,
+    /// There is a day where there is light.
+    pub(crate) day: Option<Vec<Vec<DaySample>>>,
 }
 
 /// What the heights are.
@@ -63,6 +66,22 @@ impl Arrays {
             (0..grid.patches(l).samples()).map(|_| bounds(random)).collect()
         });
         let bounds = bounds.collect();
+        let day = light.then(|| {
+            let mut half = || f16::from_f64(random.unit());
+            let mut all = |size: Size| -> Vec<DaySample> {
+                (0..size.samples())
+                    .map(|_| DaySample {
+                        first: half(),
+                        first_soft: half(),
+                        last: half(),
+                        last_soft: half(),
+                        slope: half(),
+                        unused: f16::ZERO,
+                    })
+                    .collect()
+            };
+            (0..levels).map(|l| all(grid.level(l))).collect()
+        });
         let light = light.then(|| {
             let mut half = || f16::from_f64(random.unit());
             let mut all = |size: Size| -> Vec<LightSample> {
@@ -80,6 +99,7 @@ impl Arrays {
             heights,
             bounds,
             light,
+            day,
         }
     }
 
@@ -126,6 +146,16 @@ impl Levels for Arrays {
         copy(&light[level as usize], self.grid.level(level), rect, out);
         Ok(Arrival::Arrived)
     }
+
+    fn has_day(&self) -> bool {
+        self.day.is_some()
+    }
+
+    fn day(&self, level: u32, rect: Rect, out: &mut [DaySample]) -> Result<Arrival> {
+        let day = self.day.as_ref().expect("asked for a day where there is none");
+        copy(&day[level as usize], self.grid.level(level), rect, out);
+        Ok(Arrival::Arrived)
+    }
 }
 
 /// A description in which nothing is left out.
@@ -147,6 +177,10 @@ pub(crate) fn meta(grid: Grid, light: bool) -> Meta {
             sun_azimuth_deg: 315.0,
             sun_altitude_deg: 44.99999999999999,
             sky_directions: 16,
+        }),
+        day: light.then(|| {
+            let moment = "2026-06-21T09:00Z".parse().expect("a time");
+            Day::of(moment, 42.5, 1.5 + 1.0 / 3.0, 48).expect("the sun rises there")
         }),
         source: SourceStamp {
             name: "folder/N42E001.hgt".into(),
@@ -179,6 +213,11 @@ pub(crate) fn all_bits(levels: &dyn Levels) -> Result<Vec<u32>> {
             let mut light = vec![LightSample::default(); size.samples() as usize];
             let _ = levels.light(l, size.rect(), &mut light)?;
             all.extend(light.iter().map(|s| bytemuck::cast::<_, u32>(*s)));
+        }
+        if levels.has_day() {
+            let mut day = vec![DaySample::default(); size.samples() as usize];
+            let _ = levels.day(l, size.rect(), &mut day)?;
+            all.extend(day.iter().flat_map(|s| bytemuck::cast::<_, [u32; 3]>(*s)));
         }
     }
     Ok(all)

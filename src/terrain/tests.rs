@@ -112,7 +112,7 @@ fn the_same_input_gives_the_same_bytes() {
 fn tiles_stand_in_the_order_of_the_layout() {
     let arrays = Arrays::random(600, 1300, true, Look::Smooth, 6);
     let bytes = arrays.file();
-    let layout = Layout::new(&arrays.grid, true).unwrap();
+    let layout = Layout::new(&arrays.grid, true, true).unwrap();
     // Walk the file from the first tile on, by the lengths before each tile.
     let tables = bytes.len() - walk(&bytes, &layout);
     assert!(tables > 0);
@@ -250,7 +250,7 @@ impl ReadAt for Ends {
 #[test]
 fn a_file_of_any_size_opens_without_its_index() {
     let grid = Grid::new(1 << 20, 1 << 20, [1.0, 1.0]);
-    let layout = Layout::new(&grid, true).unwrap();
+    let layout = Layout::new(&grid, true, true).unwrap();
     let header = header::to_bytes(&meta(grid, true), &header::describe(&layout)).unwrap();
     let tables = 8 * layout.tile_count();
     let last = layout.parts().len() - 1;
@@ -295,7 +295,7 @@ fn the_exr_crate_reads_every_part_as_written() {
             .all_attributes()
             .from_buffered(Cursor::new(arrays.file()))
             .unwrap();
-        let layout = Layout::new(&arrays.grid, true).unwrap();
+        let layout = Layout::new(&arrays.grid, true, true).unwrap();
         assert_eq!(image.layer_data.len(), layout.parts().len());
         for (layer, part) in image.layer_data.iter().zip(layout.parts()) {
             let level = part.level as usize;
@@ -320,7 +320,15 @@ fn the_exr_crate_reads_every_part_as_written() {
                         let of = |l: &crate::levels::LightSample| [l.sky, l.sun][index].to_f32().to_bits();
                         all.iter().map(|l| of(l).into()).collect()
                     }
-                    layout::Kind::Check | layout::Kind::CheckBounds => continue,
+                    layout::Kind::Day => {
+                        let all = &arrays.day.as_ref().unwrap()[level];
+                        let of = |d: &crate::levels::DaySample| {
+                            let fields = [d.first, d.first_soft, d.last, d.last_soft, d.slope];
+                            fields[index].to_f32().to_bits()
+                        };
+                        all.iter().map(|d| of(d).into()).collect()
+                    }
+                    layout::Kind::Check | layout::Kind::CheckDay | layout::Kind::CheckBounds => continue,
                 };
                 assert!(bits == want, "{look:?}, {}", part.name());
             }

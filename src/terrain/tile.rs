@@ -14,6 +14,9 @@ pub(crate) const BOUNDS_FIELDS: [usize; 6] = [2, 1, 0, 5, 4, 3];
 /// For each channel of a light part the field of [`crate::levels::LightSample`] it holds.
 pub(crate) const LIGHT_FIELDS: [usize; 2] = [1, 0];
 
+/// For each channel of a day part the field of [`crate::levels::DaySample`] it holds.
+pub(crate) const DAY_FIELDS: [usize; 5] = [0, 1, 2, 3, 4];
+
 /// The CRC-32C of a decoded tile, over its little-endian bytes.
 pub(super) fn check(bytes: &[u8], sample_bytes: usize) -> u32 {
     if cfg!(target_endian = "little") {

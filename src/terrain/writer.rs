@@ -12,11 +12,11 @@ use super::header;
 use super::layout::{Kind, Layout, Part, TileRow};
 use super::meta::Meta;
 use super::reader::{TerrainFile, Unwritten};
-use super::tile::{BOUNDS_FIELDS, LIGHT_FIELDS, check, little_endian, pack};
+use super::tile::{BOUNDS_FIELDS, DAY_FIELDS, LIGHT_FIELDS, check, little_endian, pack};
 use super::zip;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
-use crate::levels::{Arrival, Bounds, Levels, LightSample};
+use crate::levels::{Arrival, Bounds, DaySample, Levels, LightSample};
 use crate::progress::Progress;
 use crate::source::ReadAt;
 use crate::work::Work;
@@ -28,7 +28,7 @@ const BATCH: i64 = 16;
 
 /// Writes a terrain file of `levels` to `out`, from its beginning.
 ///
-/// The levels' grid must be that of `meta`, and they must have light exactly if `meta` says so. The same input
+/// The levels' grid must be that of `meta`, and they must have light and a day exactly if `meta` says so. The same input
 /// gives the same bytes, however `work` shares the compression out.
 ///
 /// # Errors
@@ -41,7 +41,10 @@ pub fn write<W: Write + Seek + Sync>(
     work: &dyn Work,
     progress: &dyn Progress,
 ) -> Result<W> {
-    if *levels.grid() != meta.grid || levels.has_light() != meta.light.is_some() {
+    if *levels.grid() != meta.grid
+        || levels.has_light() != meta.light.is_some()
+        || levels.has_day() != meta.day.is_some()
+    {
         return Err(Error::new(
             ErrorKind::Misuse,
             SUBJECT,
@@ -85,7 +88,7 @@ impl<W: Write + Seek> TerrainWriter<W> {
     /// # Errors
     /// What `out` meets; [`ErrorKind::Limit`] where OpenEXR cannot hold the grid.
     pub fn new(mut out: W, meta: &Meta) -> Result<Self> {
-        let layout = Layout::new(&meta.grid, meta.light.is_some())
+        let layout = Layout::new(&meta.grid, meta.light.is_some(), meta.day.is_some())
             .map_err(|what| Error::new(ErrorKind::Limit, SUBJECT, what))?;
         let exr = header::describe(&layout);
         let head = header::to_bytes(meta, &exr)?;
@@ -97,7 +100,7 @@ impl<W: Write + Seek> TerrainWriter<W> {
                 .map_err(|e| Error::io(SUBJECT, e))?;
         }
         let held = |part: &Part| match part.kind {
-            Kind::Check | Kind::CheckBounds => vec![[0; 2]; part.size.samples() as usize],
+            Kind::Check | Kind::CheckDay | Kind::CheckBounds => vec![[0; 2]; part.size.samples() as usize],
             _ => Vec::new(),
         };
         let checks = layout.parts().iter().map(held).collect();
@@ -355,7 +358,14 @@ fn decode_levels(part: &Part, rect: Rect, levels: &dyn Levels) -> Option<Result<
             let samples: &[[u16; 2]] = bytemuck::cast_slice(&light);
             Some(arrived(arrival, &|| pack(samples, width, LIGHT_FIELDS)))
         }
-        Kind::Check | Kind::CheckBounds => None,
+        Kind::Day => {
+            let mut day = vec![DaySample::default(); count];
+            let arrival = levels.day(part.level, rect, &mut day);
+            let samples: &[[u16; 6]] = bytemuck::cast_slice(&day);
+            let samples: Vec<[u16; 5]> = samples.iter().map(|s| [s[0], s[1], s[2], s[3], s[4]]).collect();
+            Some(arrived(arrival, &|| pack(&samples, width, DAY_FIELDS)))
+        }
+        Kind::Check | Kind::CheckDay | Kind::CheckBounds => None,
     }
 }
 

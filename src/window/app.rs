@@ -24,6 +24,9 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::progress::Progress;
 use crate::stream::Terrain;
 
+/// The hour by the sun at which light of a day is shown at first.
+const FIRST_HOUR: f64 = 10.0;
+
 /// Seconds for which a notice is shown, and the most of them at once.
 const NOTICE_S: f64 = 8.0;
 const NOTICES: usize = 4;
@@ -106,6 +109,7 @@ impl<'a> App<'a> {
                 tint: options.tint,
                 haze: options.haze,
                 sun: options.sun,
+                sun_hour: None,
             },
             window: None,
             graphics: None,
@@ -198,6 +202,12 @@ impl<'a> App<'a> {
         let opened = loading.poll();
         if let Some(opened) = opened {
             let (terrain, camera) = opened?;
+            if let Some(day) = terrain.day() {
+                let time = self.options.sun_time.map(|time| time.in_day(&day));
+                let hour = time.map_or(FIRST_HOUR, |time| day.hour_of_time(time));
+                self.settings.clipmap.day = true;
+                self.settings.sun_hour = Some(hour.rem_euclid(24.0));
+            }
             self.flying = Some(Flying::new(
                 &graphics.gpu,
                 Arc::new(terrain),

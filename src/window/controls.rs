@@ -227,7 +227,7 @@ pub(super) const BINDINGS: &[Binding] = &[
     acts(
         &[KeyCode::KeyU],
         "U",
-        "the sun's azimuth, with Shift back",
+        "the sun's azimuth, or the time of day, with Shift back",
         Action::Turn(Dial::SunAzimuth),
     ),
     acts(

@@ -29,7 +29,7 @@ use winit::event_loop::EventLoop;
 use crate::camera::{Camera, check_picture};
 use crate::clipmap::ClipmapOptions;
 use crate::error::{Error, ErrorKind, Result};
-use crate::light::Sun;
+use crate::light::{Sun, SunTime};
 use crate::progress::Progress;
 use crate::shade::ViewMode;
 use crate::stream::Terrain;
@@ -57,6 +57,8 @@ pub struct WindowOptions {
     pub haze: bool,
     /// The sun, where no light was traced.
     pub sun: Sun,
+    /// The time of day at first, where the terrain has light over a day.
+    pub sun_time: Option<SunTime>,
     /// Clip size, levels, transition, vertical scale, culling, promised error, waiting.
     pub clipmap: ClipmapOptions,
     /// The folder of flights and pictures.

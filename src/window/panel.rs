@@ -171,7 +171,7 @@ fn dials(ui: &mut Ui, shown: &Shown, changed: &mut Changed) {
         ui.add(free(slider));
         ui.end_row();
 
-        sun(ui, shown.traced_sun, &mut settings.sun);
+        sun(ui, shown.traced_sun, settings);
     });
     ui.horizontal(|ui| {
         ui.checkbox(&mut changed.settings.tint, "Tint (T)");
@@ -180,7 +180,14 @@ fn dials(ui: &mut Ui, shown: &Shown, changed: &mut Changed) {
     });
 }
 
-fn sun(ui: &mut Ui, traced: Option<Sun>, sun: &mut Sun) {
+fn sun(ui: &mut Ui, traced: Option<Sun>, settings: &mut Settings) {
+    if let Some(hour) = &mut settings.sun_hour {
+        ui.label("Time of day (U)");
+        ui.add(free(egui::Slider::new(hour, 0.0..=24.0).suffix(" h")));
+        ui.end_row();
+        return;
+    }
+    let sun = &mut settings.sun;
     if let Some(Sun {
         azimuth_deg,
         altitude_deg,

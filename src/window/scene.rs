@@ -67,10 +67,11 @@ impl Scene {
     ) -> Result<Self> {
         let arriving = terrain.arriving();
         let clipmap = Clipmap::new(levels(&terrain, &arriving, settings), &settings.clipmap)?;
-        let options = options(settings, sample_count, clipmap.has_light());
+        let options = options(settings, sample_count, &clipmap);
         let renderer = ClipmapRenderer::new(&gpu.device, &options)?;
         let sun = sun(&terrain, clipmap.has_light(), traced_sun, settings);
-        let textures = renderer.textures(&gpu.device, &clipmap, sun)?;
+        let mut textures = renderer.textures(&gpu.device, &clipmap, sun)?;
+        set_time_of_day(&mut textures, &terrain, &clipmap, settings)?;
         Ok(Self {
             sky: SkyRenderer::new(&gpu.device, &options)?,
             targets: Targets::new(gpu, size_px, sample_count, &options),
@@ -97,7 +98,7 @@ impl Scene {
         match self.renderers.iter().position(|(l, _)| *l == look) {
             Some(k) => self.renderers.swap(0, k),
             None => {
-                let options = options(settings, self.sample_count, self.clipmap.has_light());
+                let options = options(settings, self.sample_count, &self.clipmap);
                 let renderer = ClipmapRenderer::new(&gpu.device, &options)?;
                 self.renderers.truncate(MOST_LOOKS - 1);
                 self.renderers.insert(0, (look, renderer));
@@ -113,6 +114,7 @@ impl Scene {
         } else {
             self.textures = self.renderers[0].1.textures(&gpu.device, &self.clipmap, sun)?;
         }
+        set_time_of_day(&mut self.textures, &self.terrain, &self.clipmap, settings)?;
         self.settings = *settings;
         Ok(())
     }
@@ -150,10 +152,11 @@ impl Scene {
         if has_light == self.renderers[0].1.options().traced_light {
             return Ok(());
         }
-        let options = options(&self.settings, self.sample_count, has_light);
+        let options = options(&self.settings, self.sample_count, &self.clipmap);
         let renderer = ClipmapRenderer::new(&gpu.device, &options)?;
         let sun = self.sun_of(&self.settings);
         self.textures = renderer.textures(&gpu.device, &self.clipmap, sun)?;
+        set_time_of_day(&mut self.textures, &self.terrain, &self.clipmap, &self.settings)?;
         self.renderers = vec![(Look::of(&self.settings), renderer)];
         Ok(())
     }
@@ -259,6 +262,19 @@ fn levels<'a>(terrain: &'a Arc<Terrain>, arriving: &'a Arriving, settings: &Sett
     }
 }
 
+/// Sets the time whose light is shown, where light is of a day.
+fn set_time_of_day(
+    textures: &mut ViewTextures,
+    terrain: &Terrain,
+    clipmap: &Clipmap,
+    settings: &Settings,
+) -> Result<()> {
+    match terrain.day().zip(settings.sun_hour) {
+        Some((day, hour)) if clipmap.has_day() => textures.set_time_of_day(&day, day.time_of_hour(hour)),
+        _ => Ok(()),
+    }
+}
+
 /// The sun of the traced light, or the one that is set.
 fn sun(terrain: &Terrain, has_light: bool, traced_sun: Sun, settings: &Settings) -> Sun {
     if has_light {
@@ -268,12 +284,13 @@ fn sun(terrain: &Terrain, has_light: bool, traced_sun: Sun, settings: &Settings)
     }
 }
 
-fn options(settings: &Settings, sample_count: u32, traced_light: bool) -> RendererOptions {
+fn options(settings: &Settings, sample_count: u32, clipmap: &Clipmap) -> RendererOptions {
     RendererOptions {
         colour_format: COLOUR_FORMAT,
         sample_count,
         view_mode: settings.view_mode,
-        traced_light,
+        traced_light: clipmap.has_light(),
+        day: clipmap.has_day(),
         tint: settings.tint,
         haze: settings.haze,
         ..Default::default()

@@ -15,6 +15,9 @@ const TRANSITION_STEP: i64 = 4;
 const AZIMUTH_STEP_DEG: f64 = 15.0;
 const ALTITUDE_STEP_DEG: f64 = 5.0;
 
+/// Hours from one stop of the time of day to the next: that of the light of a day is turned in place of the sun's azimuth.
+const HOUR_STEP: f64 = 0.25;
+
 /// Least and greatest clip size.
 pub(super) const CLIP_SIZES: [i64; 2] = [64, 2048];
 
@@ -54,6 +57,8 @@ pub(super) struct Settings {
     pub(super) haze: bool,
     /// The sun, where no light was traced.
     pub(super) sun: Sun,
+    /// The hour by the sun, where light is of a day.
+    pub(super) sun_hour: Option<f64>,
 }
 
 impl Settings {
@@ -84,6 +89,10 @@ impl Settings {
             }
             Dial::Exaggeration => {
                 clipmap.vertical_scale = next(&EXAGGERATIONS, clipmap.vertical_scale, up);
+            }
+            Dial::SunAzimuth if self.sun_hour.is_some() => {
+                let step = if up { HOUR_STEP } else { -HOUR_STEP };
+                self.sun_hour = self.sun_hour.map(|hour| (hour + step).rem_euclid(24.0));
             }
             Dial::SunAzimuth => {
                 let step = if up { AZIMUTH_STEP_DEG } else { -AZIMUTH_STEP_DEG };
@@ -138,6 +147,7 @@ mod tests {
             tint: true,
             haze: true,
             sun: Sun::default(),
+            sun_hour: None,
         }
     }
 

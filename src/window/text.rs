@@ -175,7 +175,10 @@ pub(super) fn render_flags(settings: &Settings, size_px: [u32; 2], sample_count:
     if clipmap.vertical_scale != 1.0 {
         add(format!("--vertical-scale {}", clipmap.vertical_scale));
     }
-    if settings.sun != Sun::default() {
+    if let Some(hour) = settings.sun_hour {
+        let minutes = (hour * 60.0).round() as i64;
+        add(format!("--sun-time {}:{:02}", minutes / 60 % 24, minutes % 60));
+    } else if settings.sun != Sun::default() {
         add(format!(
             "--sun {},{}",
             settings.sun.azimuth_deg, settings.sun.altitude_deg
@@ -306,6 +309,7 @@ mod tests {
             tint: true,
             haze: true,
             sun: Sun::default(),
+            sun_hour: None,
         };
         assert_eq!(render_flags(&settings, [3, 2], 1), " --size 3x2 --clip-size 256");
         settings.clipmap.levels = Some(3);

@@ -57,6 +57,7 @@ impl HeightSource for Rough {
 /// Makes the terrain file `path` of `source`, with light.
 pub fn make_file(source: &dyn HeightSource, path: &Path) {
     let options = PreprocessOptions {
+        memory_bytes: 4 << 30,
         light: Some(LightOptions {
             sky_directions: 0,
             ..Default::default()

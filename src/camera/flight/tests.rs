@@ -10,6 +10,7 @@ fn key(t_s: f64, eye: [f64; 3], heading_deg: f64) -> Key {
         pitch_deg: -10.0,
         roll_deg: 0.0,
         fov_deg: 60.0,
+        sun_hour: None,
     }
 }
 
@@ -227,4 +228,42 @@ fn json_keeps_a_flight_bit_for_bit() {
     ];
     let flight = Flight::new(29.97, keys).unwrap();
     assert_eq!(Flight::parse("again", &flight.to_json()).unwrap(), flight);
+}
+
+#[test]
+fn hours_by_the_sun_are_linear_and_in_all_keys_or_none() {
+    let key = |t_s, hour| Key {
+        sun_hour: hour,
+        ..key(t_s, [0.0; 3], 0.0)
+    };
+    let flight = Flight::new(
+        30.0,
+        vec![key(0.0, Some(6.0)), key(1.0, Some(8.0)), key(3.0, Some(9.0))],
+    )
+    .unwrap();
+    for (t_s, hour) in [
+        (-1.0, 6.0),
+        (0.0, 6.0),
+        (0.5, 7.0),
+        (1.0, 8.0),
+        (2.0, 8.5),
+        (9.0, 9.0),
+    ] {
+        assert_eq!(flight.sun_hour_at(t_s), Some(hour), "{t_s} s");
+    }
+    let json = flight.to_json();
+    assert!(json.contains("\"sun_time\":6.0"), "{json}");
+    assert_eq!(Flight::parse("f", &json).unwrap(), flight);
+    assert_eq!(flight.scaled_down(2.0).unwrap().sun_hour_at(0.5), Some(7.0));
+    let without = Flight::new(30.0, vec![key(0.0, None)]).unwrap();
+    assert!(without.sun_hour_at(0.0).is_none() && !without.to_json().contains("sun_time"));
+    for keys in [
+        vec![key(0.0, Some(6.0)), key(1.0, None)],
+        vec![key(0.0, None), key(1.0, Some(6.0))],
+        vec![key(0.0, Some(f64::NAN))],
+        vec![key(0.0, Some(49.0))],
+    ] {
+        let refused = Flight::new(30.0, keys).unwrap_err().to_string();
+        assert!(refused.contains("sun_time"), "{refused}");
+    }
 }

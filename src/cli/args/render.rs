@@ -10,7 +10,7 @@ use crate::cli::values;
 use crate::cli::view_values::{self, ClipSize};
 use crate::clipmap::{ClipmapOptions, Wait};
 use crate::error::Result;
-use crate::light::Sun;
+use crate::light::{Sun, SunTime};
 use crate::shade::ViewMode;
 
 /// Draw pictures of a DEM or terrain file: one that shows the whole, one from a given place, or a flight. Of a DEM the
@@ -158,6 +158,11 @@ pub(in crate::cli) struct ViewArgs {
     #[arg(long, value_name = "AZIMUTH,ALTITUDE", value_parser = values::sun, allow_hyphen_values = true)]
     pub(in crate::cli) sun: Option<Sun>,
 
+    /// The time of day, of terrain with light over a day (preprocess --day): 9:30 by the sun, which stands highest at 12:00,
+    /// or a moment as 2026-06-21T09:30:00Z
+    #[arg(long, value_name = "TIME", value_parser = values::sun_time, conflicts_with = "sun")]
+    pub(in crate::cli) sun_time: Option<SunTime>,
+
     /// What is shown: shaded, light (the bare light), level (levels, their bands, what is held back), wire (triangles), or
     /// error (how far each pixel is off the DEM's own surface: grey 0, blue 0.1, cyan 0.25, green 0.5, yellow 1, red
     /// 2 pixels and more; magenta where the two disagree about being terrain)
@@ -201,6 +206,7 @@ impl ViewArgs {
             max_error_px: self.max_error_px,
             wait: self.wait,
             upload_budget_bytes: self.upload_budget,
+            day: false,
         };
         options.check()?;
         Ok(options)

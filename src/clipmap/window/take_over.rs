@@ -35,6 +35,9 @@ impl Window {
         for piece in other.light_pieces(light) {
             let at = self.light_slot_of(piece.x0, piece.z0);
             copy_slots(&other.light, &mut self.light, at, piece, self.light_n);
+            if !self.day.is_empty() {
+                copy_slots(&other.day, &mut self.day, at, piece, self.light_n);
+            }
         }
         written.heights.extend(self.pieces(rect));
         written.light.extend(self.light_pieces(light));

@@ -41,6 +41,7 @@ fn settings() -> Settings {
         tint: true,
         haze: true,
         sun: Sun::default(),
+        sun_hour: None,
     }
 }
 

@@ -17,6 +17,7 @@ fn settings() -> Settings {
         tint: true,
         haze: true,
         sun: Sun::default(),
+        sun_hour: None,
     }
 }
 
