@@ -108,4 +108,21 @@ impl CrestWindows {
             f32::NEG_INFINITY
         }
     }
+
+    /// The greatest height of `rect`, and of what lies near it.
+    pub(super) fn over(&self, rect: Rect) -> f32 {
+        let side = CREST as i64;
+        let blocks = |from: i64, until: i64, count: usize| {
+            (from.div_euclid(side).clamp(0, count as i64) as usize)
+                ..((until + side - 1).div_euclid(side).clamp(0, count as i64) as usize)
+        };
+        let mut most = f32::NEG_INFINITY;
+        // Windows are more than 4 blocks long.
+        for z in blocks(rect.z0, rect.z1, self.high).step_by(4) {
+            for x in blocks(rect.x0, rect.x1, self.wide).step_by(4) {
+                most = greater(most, self.highest[z * self.wide + x]);
+            }
+        }
+        most
+    }
 }

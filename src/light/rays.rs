@@ -130,16 +130,43 @@ impl Rays {
         rays
     }
 
-    /// Stage `k`, counted outward from 0, perhaps made in `room`; none where no ray of the DEM has one.
-    pub(super) fn stage<'a>(&'a self, k: i64, room: &'a mut Stage) -> Option<&'a Stage> {
-        if k >= self.stages {
-            return None;
-        }
+    /// The number of stages that any ray of the DEM has.
+    pub(super) fn stages(&self) -> i64 {
+        self.stages
+    }
+
+    /// Stage `k`, counted outward from 0, perhaps made in `room`.
+    pub(super) fn stage<'a>(&'a self, k: i64, room: &'a mut Stage) -> &'a Stage {
         if let Some(kept) = self.kept.get(k as usize) {
-            return Some(kept);
+            return kept;
         }
         self.cross(k, room);
-        Some(room)
+        room
+    }
+
+    /// As of a run that holds stage `k`, above 0, and all beyond.
+    pub(super) fn beyond(&self, k: i64) -> (f32, f32) {
+        let t = (k * STAGE) as f64 / self.rates[self.along].abs();
+        let drop = (0.5 * t / self.radius_m) as f32;
+        ((1.0 / t) as f32, drop + self.slack)
+    }
+
+    /// All samples that rays of `block` meet from stage `k` on in `count` stages.
+    pub(super) fn swept(&self, k: i64, count: i64, block: Rect) -> Rect {
+        let ends = [k, k + count].map(|k| {
+            [0, 1].map(|axis: usize| {
+                let cells = (k * STAGE) as f64 * self.rates[axis] / self.rates[self.along].abs();
+                cells.clamp(-(2.0 * MAX_SIZE as f64), 2.0 * MAX_SIZE as f64) as i64
+            })
+        });
+        let least = [0, 1].map(|axis: usize| ends[0][axis].min(ends[1][axis]) - 2);
+        let most = [0, 1].map(|axis: usize| ends[0][axis].max(ends[1][axis]) + 2);
+        Rect::new(
+            block.x0 + least[0],
+            block.z0 + least[1],
+            block.x1 + most[0],
+            block.z1 + most[1],
+        )
     }
 
     /// Puts the crossings of stage `k` into `stage`.
@@ -289,6 +316,51 @@ impl Tree<'_> {
             }
             self.runs[at].next = self.runs.len() as u32;
             from = to;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_made_anew_are_those_that_are_kept_and_hold_every_line_once() {
+        for azimuth_deg in [0.0, 45.0, 17.3, 90.2, 200.0, 359.9] {
+            let grid = Grid::new(3000, 2000, [30.0, 22.0]);
+            let kept = Rays::new(&grid, azimuth_deg, 6e6, 0.0, 1);
+            let anew = Rays::new(&grid, azimuth_deg, 6e6, 0.0, 10 * KEPT);
+            assert!(anew.kept.is_empty() && kept.stages() == anew.stages());
+            let (mut here, mut there) = (Stage::default(), Stage::default());
+            let mut last = f32::INFINITY;
+            let mut lines = 0;
+            for k in 0..kept.stages() {
+                let (a, b) = (kept.stage(k, &mut here), anew.stage(k, &mut there));
+                assert_eq!((a.hull, a.per_m, a.drop), (b.hull, b.per_m, b.drop));
+                let ends = |stage: &Stage| -> Vec<(i32, i32)> {
+                    stage.crossings.iter().map(|c| (c.a, c.b)).collect()
+                };
+                assert_eq!(ends(a), ends(b));
+                // Outward, and within what is said to be swept.
+                for crossing in &a.crossings {
+                    assert!(crossing.per_m <= last);
+                    last = crossing.per_m;
+                }
+                assert!(
+                    kept.swept(k, 1, Rect::new(0, 0, 1, 1)).contains_rect(a.hull),
+                    "{azimuth_deg}: {:?}",
+                    a.hull
+                );
+                assert!(k == 0 || a.per_m <= kept.beyond(k).0 && a.drop >= kept.beyond(k).1);
+                lines += a.crossings.len() as i64;
+            }
+            // Columns, rows and diagonals as far as the last stage goes, less what meets in samples.
+            let far_m = (kept.stages() * STAGE) as f64 / kept.rates[kept.along].abs();
+            let all: f64 = kept.rates.iter().map(|rate| (far_m * rate.abs()).floor()).sum();
+            assert!(
+                lines <= all as i64 && (azimuth_deg % 45.0 == 0.0 || lines >= all as i64 - 3),
+                "{lines} of {all}"
+            );
         }
     }
 }

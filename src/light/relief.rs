@@ -30,6 +30,10 @@ pub(super) const BLOCK: [usize; 2] = [256, 128];
 /// Groups of samples in a row of a block.
 const GROUPS: usize = BLOCK[0] / LANES;
 
+/// Stages at which all samples look, and how many farther ones are asked for together whether any need.
+const NEAR: i64 = 2;
+const FAR: i64 = 8;
+
 /// Samples from one window of maxima to the next, for each of [`SPANS`].
 const STEPS: [usize; SPANS.len()] = [16, 4, 4];
 
@@ -86,8 +90,10 @@ pub(super) struct Scratch {
     own: Vec<f32>,
     region: Region,
     room: Stage,
-    /// Groups of samples that are not decided, and those of them that look at a stage.
+    /// Groups of samples that are not decided; those of them that may look at the stages that are near, and those that
+    /// look at one.
     open: Vec<u32>,
+    near: Vec<u32>,
     looking: Vec<u32>,
     /// Of each sample of a block what its maker likes to keep.
     pub(super) kept: [Vec<f32>; 2],
@@ -100,6 +106,7 @@ impl Default for Scratch {
             region: Region::default(),
             room: Stage::default(),
             open: Vec::new(),
+            near: Vec::new(),
             looking: Vec::new(),
             kept: Default::default(),
         }
@@ -185,6 +192,7 @@ impl<'a> Relief<'a> {
             region,
             room,
             open,
+            near,
             looking,
             ..
         } = scratch;
@@ -207,28 +215,36 @@ impl<'a> Relief<'a> {
                 }
             }
         }
-        for k in 0.. {
-            let Some(stage) = rays.stage(k, room) else { break };
-            let hull = stage.hull;
-            let met = Rect::new(
-                block.x0 + hull.x0,
-                block.z0 + hull.z0,
-                block.x1 + hull.x1,
-                block.z1 + hull.z1,
-            );
-            if met.intersection(self.grid.size.rect()).is_empty() {
-                break;
+        near.clone_from(open);
+        for k in 0..rays.stages() {
+            if k >= NEAR && (k - NEAR) % FAR == 0 {
+                // Which of them need look at any of the next stages at all.
+                let (per_m, drop) = rays.beyond(k);
+                let most = self.crests[0].over(rays.swept(k, FAR, block));
+                near.clear();
+                open.retain(|&group| {
+                    let (h, t) = (heights(place(group)), lanes(tangents, group as usize * LANES));
+                    if could_rise(most, per_m, drop, h, t) {
+                        near.push(group);
+                    }
+                    // What the highest ground cannot raise from here, none will from farther out.
+                    could_rise(self.greatest, per_m, drop, h, t)
+                });
+                if open.is_empty() {
+                    break;
+                }
             }
+            if near.is_empty() {
+                continue;
+            }
+            let stage = rays.stage(k, room);
+            let hull = stage.hull;
             looking.clear();
             // Columns and rows of those that look, in the block.
             let mut ends = [usize::MAX, usize::MAX, 0, 0];
-            open.retain(|&group| {
+            for &group in &*near {
                 let at = place(group);
                 let (h, t) = (heights(at), lanes(tangents, group as usize * LANES));
-                if !could_rise(self.greatest, stage.per_m, stage.drop, h, t) {
-                    // Nor will any stage farther out.
-                    return false;
-                }
                 let corner = [
                     block.x0 + at[0] as i64 + hull.x0,
                     block.z0 + at[1] as i64 + hull.z0,
@@ -245,10 +261,6 @@ impl<'a> Relief<'a> {
                         ends[3].max(at[1] + 1),
                     ];
                 }
-                true
-            });
-            if open.is_empty() {
-                break;
             }
             if looking.is_empty() {
                 continue;

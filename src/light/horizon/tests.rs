@@ -161,6 +161,43 @@ fn runs_and_blocks_change_nothing_on_a_grid_of_many_blocks() {
 }
 
 #[test]
+fn what_stands_many_stages_away_is_seen() {
+    let long = Grid::new(6000, 24, [25.0, 20.0]);
+    let tall = Grid::new(24, 6000, [20.0, 25.0]);
+    let mut seen = 0;
+    for (grid, azimuths_deg) in [(long, [90.0, 270.0, 89.9]), (tall, [0.0, 180.0, 180.1])] {
+        let mut random = Random::new(78);
+        let mut heights = random.heights(grid.size.samples(), -5.0, 0.0, 0.02);
+        // Walls at the ends, and a few towers between them.
+        for (at, h) in (0..).zip(&mut heights) {
+            let along = (at % grid.size.width).max(at / grid.size.width);
+            if !(30..5970).contains(&along) {
+                *h += 2000.0;
+            } else if random.unit() < 0.0002 {
+                *h += 150.0;
+            }
+        }
+        for azimuth_deg in azimuths_deg {
+            let got = tangents(&heights, &grid, azimuth_deg);
+            for _ in 0..60 {
+                let (i, j) = (random.below(grid.size.width), random.below(grid.size.height));
+                let at = (j * grid.size.width + i) as usize;
+                let (want, slack) = brute_tangent(&heights, &grid, azimuth_deg, i, j);
+                let fine = heights[at].is_nan() || (f64::from(got[at]) - want).abs() <= slack;
+                assert!(
+                    fine,
+                    "azimuth {azimuth_deg}, ({i}, {j}): {} against {want}",
+                    got[at]
+                );
+                // Most of what is seen is a wall beyond the stages at which all look.
+                seen += u32::from(want > 0.0 && want < 2010.0 / (600.0 * 25.0));
+            }
+        }
+    }
+    assert!(seen > 100, "{seen}");
+}
+
+#[test]
 fn impossible_input_is_refused() {
     let grid = Grid::new(3, 3, [1.0, 1.0]);
     let kind = |heights: &[f32], azimuth_deg| {
