@@ -121,8 +121,8 @@ impl Skylight {
                     .chunks_exact_mut(LANES)
                     .zip(rises.chunks_exact(2 * LANES))
                 {
-                    for l in 0..LANES {
-                        tangents[l] = towards(rises, l).max(0.0); // 0 at voids too
+                    for (l, tangent) in tangents.iter_mut().enumerate() {
+                        *tangent = towards(rises, l).max(0.0); // 0 at voids too
                     }
                 }
                 relief.raise(rays, block, f32::INFINITY, &mut tangents, scratch)?;
