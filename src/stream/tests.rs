@@ -254,6 +254,13 @@ fn the_budget_holds_whoever_reads() {
         }
         std::thread::sleep(Duration::from_millis(3));
     }
+    // However busy the machine is, some come.
+    for _ in 0..30_000 {
+        if tiles.most_bytes() > 1 << 20 {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
     assert!(tiles.most_bytes() <= LEAST_TILE_BYTES, "{}", tiles.most_bytes());
     assert!(tiles.most_bytes() > 1 << 20);
 }
