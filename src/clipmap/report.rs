@@ -23,7 +23,7 @@ pub struct UpdateReport {
     pub stale_levels: u32,
     /// Patches whose detail vanished at once, because their data came too late to be taken back gently.
     pub pops: u64,
-    /// Whether coarser levels were left out by [`ClipmapOptions::levels`], so that the picture ends at a border.
+    /// Whether coarser levels were left out by [`ClipmapOptions::levels`](super::ClipmapOptions::levels), so that the picture ends at a border.
     pub cut: bool,
     /// Whether some of what is resident stands in for data that are not there yet.
     pub provisional: bool,
