@@ -47,7 +47,7 @@ fn fragment(in: Varyings) -> @location(0) vec4<f32> {
     let place = in.from_eye + view.fraction + vec2<f32>(view.anchor) + 0.5;
     let slope = textureSampleLevel(slopes, slope_sampler, place / vec2<f32>(textureDimensions(slopes)), 0.0);
     let point = GroundPoint(in.from_eye, in.height, 0.0, 0u);
-    let colour = view_colour(surface_point(point, vec4(0.0, 0.0, slope.xy)));
+    let colour = view_colour(surface_point(point, vec4(0.0, 0.0, slope.xy), 0.0));
     return vec4(encode(colour.rgb), colour.a);
 }
 ";
