@@ -189,14 +189,20 @@ impl Selection {
         let ragged = voids || scene.over_the_edge(patch);
         if let Some(frustum) = scene.frustum {
             let [low, high] = scene.patch_box(patch, heights);
-            let sector = self.occlusion.is_used().then(|| Sector::new(low, high)).flatten();
-            let hidden = || sector.is_some_and(|s| self.occlusion.hides(&s));
-            if frustum.cutting(low, high, planes).is_none() || hidden() {
+            if frustum.cutting(low, high, planes).is_none() {
                 self.culled += 1;
                 return;
             }
-            if let Some(sector) = sector.filter(|_| !ragged) {
-                self.occlusion.raise(&sector);
+            if self.occlusion.is_used()
+                && let Some(sector) = Sector::new(low, high)
+            {
+                if self.occlusion.hides(&sector) {
+                    self.culled += 1;
+                    return;
+                }
+                if !ragged {
+                    self.occlusion.raise(&sector);
+                }
             }
         }
         let instance = Instance {
