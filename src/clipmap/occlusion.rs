@@ -24,6 +24,8 @@
 //! *Rounding.* Directions and tangents keep a distance of [`SLACK_PX`] pixels, to which rasterisers may snap vertices,
 //! and of what f32 loses of a position on its way to the screen.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use super::screen::Screen;
@@ -110,6 +112,14 @@ impl Sector {
 fn bin([x, z]: [f64; 2]) -> f64 {
     let along = x / (x.abs() + z.abs());
     QUARTER as f64 * if z >= 0.0 { 1.0 - along } else { 3.0 + along }
+}
+
+/// Bins from `first` to `end`, less than a turn, as ranges of the circle's: the second one is empty where they do not go
+/// round it.
+fn turns(first: usize, end: usize) -> [Range<usize>; 2] {
+    let start = first % BINS;
+    let end = start + (end - first).min(BINS);
+    [start..end.min(BINS), 0..end.saturating_sub(BINS)]
 }
 
 /// How much of a picture's precision is kept between what hides and what is hidden.
@@ -199,7 +209,9 @@ impl OcclusionHorizon {
         // A bin below 0 is one of the turn before.
         let first = (first + BINS as f64) as usize;
         let end = (last + BINS as f64) as usize + 1;
-        (first..end).all(|k| self.tangents[k % BINS] > least)
+        turns(first, end)
+            .into_iter()
+            .all(|bins| self.tangents[bins].iter().all(|tangent| *tangent > least))
     }
 
     /// Raises it by a patch without voids.
@@ -211,9 +223,10 @@ impl OcclusionHorizon {
         }
         let tangent = tangent as f32;
         let (first, end) = (sector.bins[0].ceil() as usize, sector.bins[1] as usize);
-        for k in first..end {
-            let (k, least) = (k % BINS, self.tangents[k % BINS]);
-            self.tangents[k] = least.max(tangent.min(self.ceilings[k]));
+        for bins in turns(first, end.max(first)) {
+            for (least, ceiling) in self.tangents[bins.clone()].iter_mut().zip(&self.ceilings[bins]) {
+                *least = least.max(tangent.min(*ceiling));
+            }
         }
     }
 
@@ -227,8 +240,9 @@ impl OcclusionHorizon {
             return;
         };
         let first = (sector.bins[0] + BINS as f64 - 1.0) as usize;
-        for k in first..=first + (sector.bins[1] - sector.bins[0]) as usize + 3 {
-            self.ceilings[k % BINS] = f32::NEG_INFINITY;
+        let end = first + (sector.bins[1] - sector.bins[0]) as usize + 4;
+        for bins in turns(first, end) {
+            self.ceilings[bins].fill(f32::NEG_INFINITY);
         }
     }
 }
