@@ -370,6 +370,8 @@ impl Window {
             .any(|(i, j)| self.heights[self.index(i, j)].is_nan());
         let index = self.patch_index(a, b);
         let voids_below = self.patches[index].is_some_and(|p| p.voids_below);
+        // What was handed up before holds still.
+        let is_news = self.patches[index].is_none_or(|p| voids && !p.voids);
         let known = self.patches[index].map(|p| p.bounds);
         let bounds = match (known, bounds) {
             // What stood in for these data is still drawn beside them.
@@ -382,7 +384,9 @@ impl Window {
             voids_below,
         });
         self.has_met_voids |= voids;
-        self.noted.push([a, b]);
+        if is_news {
+            self.noted.push([a, b]);
+        }
     }
 
     /// A patch of which something was read since it was last taken here.
