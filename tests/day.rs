@@ -3,6 +3,9 @@
 //! At the time of one of its positions a day must light ground as a file made for that sun alone does. On level 0 it is off
 //! where times are rounded (to 7 s of a day of 8 hours) and where the disc rises otherwise than between two positions in
 //! the mean; on coarser levels by what two moments say of a distribution. The tolerances are about twice what was measured.
+//!
+//! How long ground lies in shadow between its first and its last light is looked at on a part of the shipped DEM, and with
+//! `CLIPSCAPE_WHOLE=1` on all of it.
 #![allow(clippy::print_stderr, reason = "says what it found")]
 
 use std::path::Path;
@@ -10,7 +13,9 @@ use std::path::Path;
 use clipscape::build::Threads;
 use clipscape::grid::{Grid, Rect, Size};
 use clipscape::levels::{DaySample, LightSample};
-use clipscape::light::{Day, Earth, day_levels, light_levels, sun_of_day, sun_share, trace_day};
+use clipscape::light::{
+    Day, Earth, day_levels, horizon_tangents, light_levels, sun_of_day, sun_share, trace_day,
+};
 use clipscape::progress::Silent;
 use clipscape::pyramid::{Filter, Pyramid};
 use half::f16;
@@ -155,4 +160,49 @@ fn at_its_positions_a_day_is_lit_as_by_single_suns() {
             );
         }
     }
+}
+
+/// The share of the lit time that ground is lit too long: it lies in shadow between its first and its last light.
+fn shaded_between(heights: &[f32], grid: &Grid, day: &Day) -> f64 {
+    let threads = Threads::new(0).unwrap();
+    let trace = trace_day(heights, grid, &Earth::default(), day, &threads, &Silent).unwrap();
+    let (mut lit, mut shaded) = (0u64, 0u64);
+    for k in 0..day.positions {
+        let time = day.time_of_position(k);
+        let sun = day.sun(time).unwrap();
+        let tangents = horizon_tangents(heights, grid, sun.azimuth_deg, &threads, &Silent).unwrap();
+        let altitude = sun.altitude_deg.to_radians() as f32;
+        for (n, tangent) in tangents.iter().enumerate().filter(|(n, _)| !heights[*n].is_nan()) {
+            let is_up = altitude > tangent.atan();
+            lit += u64::from(is_up);
+            let time = time as f32;
+            shaded += u64::from(!is_up && trace.first[n] < time && time < trace.last[n]);
+        }
+    }
+    shaded as f64 / lit as f64
+}
+
+#[test]
+fn ground_hardly_ever_lies_in_shadow_between_its_first_and_its_last_light() {
+    let dem = match std::env::var_os("CLIPSCAPE_WHOLE") {
+        Some(_) => pyrenees(Rect::new(0, 0, 1201, 1201)),
+        None => pyrenees(Rect::new(300, 300, 812, 812)),
+    };
+    for date in ["2026-06-21", "2026-03-20", "2026-12-21"] {
+        let share = shaded_between(&dem.heights, &dem.grid, &day(date, 48));
+        eprintln!("{date}: {:.4} % of the lit time", 100.0 * share);
+        assert!(share < 0.002, "{date}: {share}");
+    }
+    // A control: a tower on a plain shades what lies north of it at noon.
+    let grid = Grid::new(64, 64, [30.0, 30.0]);
+    let tower = |(i, j): (i64, i64)| {
+        if (30..34).contains(&i) && j == 40 {
+            900.0
+        } else {
+            0.0
+        }
+    };
+    let heights: Vec<f32> = grid.size.rect().cells().map(tower).collect();
+    let share = shaded_between(&heights, &grid, &day("2026-12-21", 48));
+    assert!(share > 0.002, "the tower's shadow is {share} of the lit time");
 }

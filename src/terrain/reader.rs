@@ -334,14 +334,7 @@ impl TerrainFile {
         if rect.is_empty() {
             return Ok(Arrival::Arrived);
         }
-        let tile_of = |n: i64| n / super::layout::TILE;
-        let tiles = Rect::new(
-            tile_of(rect.x0),
-            tile_of(rect.z0),
-            tile_of(rect.x1 - 1) + 1,
-            tile_of(rect.z1 - 1) + 1,
-        );
-        for (x, y) in tiles.cells() {
+        for (x, y) in tiles_of(rect).cells() {
             unpack(
                 &self.tile(part, x, y)?,
                 description.tile_rect(x, y),
@@ -362,14 +355,7 @@ impl TerrainFile {
         out: &mut [f32],
     ) -> Result<()> {
         let part = self.layout.part(Kind::Height, level);
-        let tile_of = |n: i64| n / super::layout::TILE;
-        let tiles = Rect::new(
-            tile_of(rect.x0),
-            tile_of(rect.z0),
-            tile_of(rect.x1 - 1) + 1,
-            tile_of(rect.z1 - 1) + 1,
-        );
-        for (x, y) in tiles.cells() {
+        for (x, y) in tiles_of(rect).cells() {
             let tile_rect = self.layout.parts()[part].tile_rect(x, y);
             let both = tile_rect.intersection(rect);
             let tile = self.tile(part, x, y)?;
@@ -464,4 +450,15 @@ impl Levels for TerrainFile {
         }
         Ok(arrival)
     }
+}
+
+/// Columns and rows of the tiles that hold samples of `rect`, which is not empty.
+fn tiles_of(rect: Rect) -> Rect {
+    let tile_of = |n: i64| n / super::layout::TILE;
+    Rect::new(
+        tile_of(rect.x0),
+        tile_of(rect.z0),
+        tile_of(rect.x1 - 1) + 1,
+        tile_of(rect.z1 - 1) + 1,
+    )
 }
