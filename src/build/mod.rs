@@ -18,6 +18,7 @@ mod memory;
 mod output;
 mod part;
 mod preprocess;
+mod pyramid;
 mod relight;
 #[cfg(test)]
 mod tests;
@@ -28,6 +29,7 @@ pub use crate::terrain::SourceStamp;
 pub use memory::{DEFAULT_MEMORY_BYTES, HELD_MEMORY_BYTES, needed_bytes, peak_rss_bytes, preprocess_bytes};
 pub use output::{Output, refuse_existing};
 pub use part::{Part, PartKind};
-pub use preprocess::{PreprocessOptions, PreprocessReport, build_pyramid, preprocess};
+pub use preprocess::{PreprocessOptions, PreprocessReport, preprocess};
+pub use pyramid::build_pyramid;
 pub use relight::relight;
 pub use threads::Threads;

@@ -4,21 +4,20 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::time::Instant;
 
-use super::bands::BAND_ROWS;
 use super::bounds::write_bounds;
 use super::day::write_day;
 use super::heights::write_heights;
 use super::light::{Lit, write_light};
-use super::memory::{self, DEFAULT_MEMORY_BYTES, HELD_MEMORY_BYTES, peak_rss_bytes, preprocess_bytes};
+use super::memory::{self, DEFAULT_MEMORY_BYTES, peak_rss_bytes, preprocess_bytes};
 use super::output::Output;
 use super::threads::Threads;
 use super::tiles::put_checks;
 use crate::error::{Error, ErrorKind, Result};
-use crate::grid::{Grid, Rect, Size};
+use crate::grid::Grid;
 use crate::light::{Day, Earth, LightOptions};
 use crate::progress::Progress;
-use crate::pyramid::{Filter, Pyramid, rounding_step};
-use crate::source::{self, Description, HeightSource};
+use crate::pyramid::{Filter, rounding_step};
+use crate::source::{self, Description, Destepped, HeightSource};
 use crate::terrain::layout::Layout;
 use crate::terrain::{self, LightMeta, Meta, SourceStamp, TerrainWriter};
 
@@ -33,6 +32,8 @@ pub struct PreprocessOptions {
     pub curvature: Option<f64>,
     /// The filter that makes the levels above 0.
     pub filter: Filter,
+    /// Whether level 0 is freed of the steps of whole numbers first, by [`Destepped`].
+    pub destep: bool,
     /// Whether to replace a target that exists.
     pub force: bool,
     /// A DEM that needs more memory than this is refused.
@@ -50,6 +51,7 @@ impl Default for PreprocessOptions {
             day: None,
             curvature: None,
             filter: Filter::default(),
+            destep: false,
             force: false,
             memory_bytes: DEFAULT_MEMORY_BYTES,
             threads: 0,
@@ -104,6 +106,7 @@ pub fn preprocess(
     options: &PreprocessOptions,
     progress: &dyn Progress,
 ) -> Result<PreprocessReport> {
+    let destepped = options.destep.then(|| Destepped::new(source)).transpose()?;
     let description = source.description();
     let stamp = match options.source.name.as_str() {
         "" => SourceStamp {
@@ -119,7 +122,8 @@ pub fn preprocess(
     let earth = Earth::of(&description.grid, description.place.as_ref(), options.curvature)
         .map_err(|e| e.about(&description.name))?;
     check_day(options)?;
-    let needed = |grid: &Grid| preprocess_bytes(grid, options.light.is_some(), source.held_bytes());
+    let read: &dyn HeightSource = destepped.as_ref().map_or(source, |destepped| destepped);
+    let needed = |grid: &Grid| preprocess_bytes(grid, options.light.is_some(), read.held_bytes());
     let needed = |grid: &Grid| needed(grid).max(options.day.map_or(0, |_| memory::day_bytes(grid)));
     let advice = if options.light.is_some() {
         "leave out the light, or cut the DEM"
@@ -140,12 +144,18 @@ pub fn preprocess(
             rounding_step(step).ok_or_else(|| Error::new(ErrorKind::Misuse, &description.name, what()))
         })
         .transpose()?;
+    // A step of level 1 is two of level 0: twice the quantum there is the same of slopes.
+    let quanta_m = destepped.as_ref().map(|destepped| 2.0 * destepped.quantum_m());
+    let rounding_step_m = quanta_m.or(rounding_step_m);
     Layout::new(&description.grid, options.light.is_some(), options.day.is_some())
         .map_err(|what| Error::new(ErrorKind::Limit, &description.name, what).advice("cut the DEM"))?;
     let threads = Threads::new(options.threads)?;
     let (output, file) = Output::create(out, options.force)?;
 
-    let meta = describe(description, rounding_step_m, options, &earth, stamp);
+    let meta = Meta {
+        destep_m: destepped.as_ref().map(Destepped::step_m),
+        ..describe(description, rounding_step_m, options, &earth, stamp)
+    };
     let steps = || {
         let clock = Clock::start();
         let mut report = PreprocessReport {
@@ -156,7 +166,7 @@ pub fn preprocess(
         let buffered = BufWriter::with_capacity(1 << 20, &file);
         let mut writer = TerrainWriter::new(buffered, &meta)?;
         let found = write_heights(
-            source,
+            read,
             &mut writer,
             &options.filter,
             rounding_step_m,
@@ -218,34 +228,6 @@ pub fn preprocess(
     Ok(report)
 }
 
-/// Reads `source` whole and builds its pyramid with bounds, without light: what rendering a raw DEM needs.
-///
-/// # Errors
-/// [`ErrorKind::Limit`] where it needs more than [`HELD_MEMORY_BYTES`]; [`ErrorKind::Cancelled`]; and what reading
-/// meets.
-pub fn build_pyramid(source: &dyn HeightSource, filter: &Filter, progress: &dyn Progress) -> Result<Pyramid> {
-    let description = source.description();
-    memory::check(
-        &description.name,
-        &description.grid,
-        |grid| memory::needed_bytes(grid, false),
-        HELD_MEMORY_BYTES,
-        "preprocess it, or cut it",
-    )?;
-    let threads = Threads::new(0)?;
-    let heights = read(source, progress)?;
-    let mut pyramid = Pyramid::new(
-        description.grid,
-        heights,
-        description.step_m,
-        filter,
-        &threads,
-        progress,
-    )?;
-    pyramid.bound(&threads, progress)?;
-    Ok(pyramid)
-}
-
 /// Time by laps.
 struct Clock {
     start: Instant,
@@ -292,35 +274,6 @@ fn refuse_own_input(name: &str, out: &Path) -> Result<()> {
     }
 }
 
-/// All heights of level 0, read in bands from north to south.
-fn read(source: &dyn HeightSource, progress: &dyn Progress) -> Result<Vec<f32>> {
-    let Description { grid, name, .. } = source.description();
-    grid.check()
-        .map_err(|what| Error::new(ErrorKind::Misuse, name, what))?;
-    let Size { width, height } = grid.size;
-    let count = grid.size.samples() as usize;
-    let mut heights = Vec::new();
-    heights.try_reserve_exact(count).map_err(|e| {
-        Error::new(
-            ErrorKind::Limit,
-            name,
-            format!("no memory for {width} x {height} samples"),
-        )
-        .because(e)
-    })?;
-    heights.resize(count, f32::NAN);
-    progress.begin("read", count as u64);
-    let bands = heights.chunks_mut((BAND_ROWS * width) as usize);
-    for (band, z) in bands.zip((0..height).step_by(BAND_ROWS as usize)) {
-        if progress.cancelled() {
-            return Err(Error::cancelled(name));
-        }
-        source.read(Rect::new(0, z, width, (z + BAND_ROWS).min(height)), band)?;
-        progress.advance(band.len() as u64);
-    }
-    Ok(heights)
-}
-
 /// Upper bound of what rounding heights to f32 cost, in metres: 0 where the source's own type and step show
 /// that f32 holds each of them, else half the spacing of f32 at the greatest, which is `most` in size.
 fn rounding_m(description: &Description, most: f32) -> f64 {
@@ -361,6 +314,7 @@ fn describe(
         filter: options.filter.kind().name().into(),
         lobes: options.filter.lobes(),
         rounding_step_m,
+        destep_m: None,
         light: options.light.map(|light| LightMeta {
             sun_azimuth_deg: light.sun.azimuth_deg,
             sun_altitude_deg: light.sun.altitude_deg,

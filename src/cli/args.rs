@@ -130,6 +130,10 @@ pub(super) struct PreprocessArgs {
     #[arg(long, value_name = "NAME", value_parser = values::filter(), hide_possible_values = true)]
     pub(super) filter: Option<FilterKind>,
 
+    /// Smooth the terraces of a DEM of whole metres (or of another step) away, moving no height by more than half a step
+    #[arg(long)]
+    pub(super) destep: bool,
+
     /// Refuse a DEM that needs more memory than this, as in 512M or 2GiB [default: 512M]
     #[arg(long, value_name = "BYTES", value_parser = values::bytes)]
     pub(super) memory: Option<u64>,

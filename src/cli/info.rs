@@ -60,6 +60,9 @@ struct Info {
     registration: Option<Registration>,
     /// Levels of its pyramid.
     levels: u32,
+    /// The step in metres that was smoothed away of its heights, which moved by half of it at most; null where they are as
+    /// they were read.
+    destep: Option<f64>,
     /// How its light was traced; null where it has none.
     light: Option<Light>,
     /// Its light over a day; null where it has none.
@@ -173,6 +176,7 @@ fn of_terrain(file: &TerrainFile, all: bool, progress: &dyn Progress) -> Result<
         meta.light,
         &meta.assumed,
     );
+    info.destep = meta.destep_m;
     info.day = meta.day.map(|day| DayInfo {
         positions: day.positions,
         noon: day.noon.to_string(),
@@ -282,6 +286,7 @@ impl Info {
                 sun: [l.sun_azimuth_deg, l.sun_altitude_deg],
                 sky_directions: l.sky_directions,
             }),
+            destep: None,
             day: None,
             assumed: assumed.to_vec(),
             noticed: Vec::new(),
@@ -343,6 +348,13 @@ fn text(name: &str, info: &Info, verified: bool) -> String {
         _ => line("place", "unknown".into()),
     }
     line("levels", info.levels.to_string());
+    if let Some(step) = info.destep {
+        let (step, half) = (short(step), short(0.5 * step));
+        line(
+            "destep",
+            format!("steps of {step} m smoothed away, by at most {half} m"),
+        );
+    }
     match &info.light {
         Some(light) => {
             let [azimuth, altitude] = light.sun.map(short);

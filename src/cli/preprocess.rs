@@ -29,10 +29,15 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
             )
         }
         Input::Terrain(file) => {
-            if args.filter.is_some() {
-                let what = "is a terrain file, whose filter is fixed";
-                let error = Error::new(ErrorKind::Misuse, file.name(), what);
-                return Err(error.advice("give --filter when it is made").into());
+            for (given, what, flag) in [
+                (args.filter.is_some(), "filter is fixed", "--filter"),
+                (args.destep, "heights are fixed", "--destep"),
+            ] {
+                if given {
+                    let what = format!("is a terrain file, whose {what}");
+                    let error = Error::new(ErrorKind::Misuse, file.name(), what);
+                    return Err(error.advice(format!("give {flag} when it is made")).into());
+                }
             }
             (
                 file.meta().grid,
@@ -82,6 +87,7 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
         day,
         curvature: args.curvature,
         filter: args.filter.unwrap_or_default().into(),
+        destep: args.destep,
         force: args.force,
         memory_bytes: args.memory.unwrap_or(defaults.memory_bytes),
         source: input::stamp(&args.input.inputs),

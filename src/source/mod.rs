@@ -4,6 +4,7 @@
 mod archive;
 mod ascii_grid;
 mod crop;
+mod destep;
 mod dted;
 mod ehdr;
 mod envi;
@@ -33,6 +34,7 @@ mod usgs_dem;
 #[cfg(feature = "dem")]
 mod write;
 
+pub use destep::Destepped;
 pub use georeference::{Georeference, Registration};
 pub use open::open_bytes;
 pub(crate) use openexr::{Wanted, read_channel};

@@ -8,6 +8,13 @@ use crate::work::Work;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Processors;
 
+impl Processors {
+    /// How many tasks run at once.
+    pub(super) fn count() -> usize {
+        rayon::current_num_threads()
+    }
+}
+
 impl Work for Processors {
     fn each(&self, count: usize, task: &(dyn Fn(usize) + Sync)) {
         if count < 2 {

@@ -12,6 +12,7 @@
 //! | `clipscape.crs`, `.origin`, `.pixel`, `.registration`, `.geographic` | [`Georeference`] |
 //! | `clipscape.vertical_unit` | unit of heights as read |
 //! | `clipscape.filter`, `.lobes`, `.rounding_step` | how levels above 0 were made: a name of [`crate::pyramid::FilterKind`], its kernel's reach a side in coarse samples, the step in metres |
+//! | `clipscape.destep` | the step in metres that was smoothed away of level 0, by half of it at most |
 //! | `clipscape.sun`, `.sky_directions` | azimuth and altitude in degrees; number of directions |
 //! | `clipscape.day` | positions, half its length in seconds, latitude and longitude in degrees, Julian date of noon (UT) and terrestrial time less UT in seconds: [`Day`] |
 //! | `clipscape.source`, `.source_bytes`, `.source_modified` | name, length, seconds since 1970 |
@@ -69,6 +70,8 @@ pub struct Meta {
     pub lobes: u32,
     /// The step to which heights above level 0 are rounded, in metres, where they are.
     pub rounding_step_m: Option<f64>,
+    /// The step of the source's heights in metres, where level 0 holds them de-stepped: within half of it.
+    pub destep_m: Option<f64>,
     /// How the light was traced; the file has light exactly if this is there.
     pub light: Option<LightMeta>,
     /// The day whose light it has beside that; the file has light over a day exactly if this is there.
@@ -121,6 +124,10 @@ impl Meta {
         put(
             "rounding_step",
             self.rounding_step_m.map(|s| format!("{s:?}")).unwrap_or_default(),
+        );
+        put(
+            "destep",
+            self.destep_m.map(|s| format!("{s:?}")).unwrap_or_default(),
         );
         if let Some(light) = &self.light {
             put(
@@ -198,6 +205,7 @@ impl Meta {
             filter: read.text("filter").unwrap_or_default().into(),
             lobes: read.required("lobes")?,
             rounding_step_m: read.optional("rounding_step")?,
+            destep_m: read.optional("destep")?,
             light,
             day: read.optional("day")?,
             source: SourceStamp {
@@ -284,6 +292,7 @@ mod tests {
         bare.assumed.clear();
         bare.source = SourceStamp::default();
         bare.rounding_step_m = None;
+        bare.destep_m = None;
         bare.grid.base_m = -1.0e-300;
         bare.grid.offset = [-(1 << 60), 1 << 60];
         assert_eq!(

@@ -173,6 +173,7 @@ pub(crate) fn meta(grid: Grid, light: bool) -> Meta {
         filter: "sinc-blackman".into(),
         lobes: 4,
         rounding_step_m: Some(1.0 / 64.0),
+        destep_m: Some(0.1),
         light: light.then_some(LightMeta {
             sun_azimuth_deg: 315.0,
             sun_altitude_deg: 44.99999999999999,
