@@ -9,6 +9,7 @@ use std::io::{Seek, Write};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
+use super::tightness::{Tight, Tightness};
 use super::tiles::{Tiles, put_tiles};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Rect, Size};
@@ -20,19 +21,22 @@ use crate::terrain::layout::{Kind, TILE};
 use crate::terrain::{BOUNDS_FIELDS, TerrainFile, TerrainWriter};
 use crate::work::Work;
 
-/// Seconds that the second pass took.
+/// What the second pass took, in seconds, and found.
 #[derive(Debug, Default)]
 pub(super) struct Took {
     /// Reading back and measuring.
     pub(super) bounds_s: f64,
     /// Compressing and writing.
     pub(super) write_s: f64,
+    /// What a look at some of the stored errors found.
+    pub(super) tight: Tight,
 }
 
 /// Puts the bounds of all levels, of the heights in `heights`, and returns how high these reach near each place.
 ///
 /// # Errors
-/// What the file meets; [`crate::ErrorKind::Cancelled`].
+/// What the file meets; [`crate::ErrorKind::Broken`] where a stored error is found too small;
+/// [`crate::ErrorKind::Cancelled`].
 pub(super) fn write_bounds<W: Write + Seek + Sync + Send>(
     heights: &TerrainFile,
     writer: &mut TerrainWriter<W>,
@@ -47,6 +51,7 @@ pub(super) fn write_bounds<W: Write + Seek + Sync + Send>(
     let mut due = writer.layout().order_of(Kind::Bounds).into_iter().peekable();
     let mut took = Took::default();
     let mut crests = Crests::new(&grid);
+    let mut tightness = Tightness::new(&grid);
     for z0 in (0..height).step_by(TILE as usize) {
         if progress.cancelled() {
             return Err(Error::cancelled(heights.name()));
@@ -62,11 +67,13 @@ pub(super) fn write_bounds<W: Write + Seek + Sync + Send>(
             let mut truth = vec![0.0; block.area() as usize];
             arrived(heights.heights(0, block, &mut truth)?);
             let highest = Crests::measure(&truth, block.width() as usize);
-            Ok((block, highest, measure(&grid, block, &truth, &rows)))
+            let found = tightness.look(block, &truth, &rows);
+            Ok((block, highest, measure(&grid, block, &truth, &rows), found))
         })?;
-        for (block, highest, shares) in &shares {
+        for (block, highest, shares, found) in &shares {
             crests.put(*block, highest);
             shares.iter().for_each(|share: &Share| bounds.add(share));
+            tightness.add(found);
         }
         bounds.advance(z1);
         took.bounds_s += start.elapsed().as_secs_f64();
@@ -77,9 +84,11 @@ pub(super) fn write_bounds<W: Write + Seek + Sync + Send>(
             let made = bounds
                 .take(level, TILE)
                 .expect("the order says when a row is known");
+            let width = grid.patches(level).width;
+            tightness.stored(level, row.y * TILE, width, &made);
             let tiles = Tiles {
                 row,
-                width: grid.patches(level).width,
+                width,
                 samples: bytemuck::cast_slice::<_, [f32; 6]>(&made),
                 fields: BOUNDS_FIELDS,
             };
@@ -88,6 +97,7 @@ pub(super) fn write_bounds<W: Write + Seek + Sync + Send>(
         took.write_s += start.elapsed().as_secs_f64();
         progress.advance((width * (z1 - z0)) as u64);
     }
+    took.tight = tightness.finish(heights.name())?;
     Ok((took, crests))
 }
 

@@ -20,9 +20,11 @@ mod part;
 mod preprocess;
 mod pyramid;
 mod relight;
+mod rounding;
 #[cfg(test)]
 mod tests;
 mod threads;
+mod tightness;
 mod tiles;
 
 pub use crate::terrain::SourceStamp;

@@ -114,6 +114,12 @@ pub(super) fn run(args: &PreprocessArgs, terminal: &Terminal) -> Outcome {
             .map_err(|e| Error::io(path.display(), e))?;
         output.publish(&file)?;
     }
+    if let (Some(median), Some(least)) = (report.error_ratio_median, report.error_ratio_least) {
+        terminal.note(&format!(
+            "errors of {} patches were found anew: true over stored {median:.6} in the median, {least:.6} at least, none above 1",
+            report.checked_patches
+        ));
+    }
     terminal.note(&format!("{} is made, in {:.1} s", out.display(), report.total_s));
     Ok(())
 }

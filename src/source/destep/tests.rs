@@ -190,7 +190,7 @@ fn terraces_become_the_slopes_that_they_were() {
         (
             "cone",
             |x, z| 200.0 - 0.1 * (x - 200.3).hypot(z - 180.7),
-            [10.0, 20.0],
+            [10.0, 15.0],
         ),
         (
             "hills",
@@ -200,7 +200,7 @@ fn terraces_become_the_slopes_that_they_were() {
         (
             "gentle hills",
             |x, z| 6.0 * (x / 60.0).sin() * (z / 75.0).cos(),
-            [5.0, 10.0],
+            [5.0, 8.0],
         ),
     ];
     for (name, truth, [least, least_slope]) in cases {
