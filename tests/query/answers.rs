@@ -7,7 +7,7 @@ use clipscape::error::{Error, ErrorKind};
 use clipscape::grid::{Grid, Rect};
 use clipscape::levels::{Arrival, Bounds, Levels, LightSample};
 use clipscape::pyramid::Pyramid;
-use clipscape::query::{Picker, Reader, S0, Surface, collider};
+use clipscape::query::{Picker, S0, Surface, collider};
 use glam::DVec3;
 
 use crate::support::{Formula, Random, hills, seed};

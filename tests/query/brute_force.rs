@@ -2,7 +2,6 @@
 
 use clipscape::clipmap::{ClipmapOptions, Drawn};
 use clipscape::grid::Grid;
-use clipscape::levels::Levels;
 use clipscape::query::{S0, Surface};
 use clipscape::work::Work;
 use glam::DVec3;

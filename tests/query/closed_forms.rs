@@ -2,7 +2,6 @@
 
 use clipscape::clipmap::{Drawn, Place};
 use clipscape::grid::{Grid, Patch, Rect};
-use clipscape::levels::Levels;
 use clipscape::query::{Reader, S0, Surface};
 use glam::DVec3;
 
