@@ -32,8 +32,11 @@ mod sun_at;
 
 pub use crests::{CREST, Crests};
 pub(crate) use day::disc_coefficients;
+#[cfg(test)]
+pub(crate) use day::plain as plain_day;
 pub use day::{
-    DAY_POSITIONS, Day, DayTrace, SunTime, day_levels, disc, disc_integral, sun_of_day, trace_day,
+    DAY_POSITIONS, Day, DayLevels, Daylight, LitTimes, SunTime, day_levels, disc, disc_integral, sun_of_day,
+    trace_day,
 };
 pub use earth::{DEFAULT_REFRACTION, Earth, middle};
 pub use fill::fill_voids;
