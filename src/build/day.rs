@@ -1,6 +1,6 @@
 //! The fourth pass: light over a day, traced over the heights of a terrain file.
 //!
-//! What is held depends on the DEM's width alone: for each column of level 0 11 KiB.
+//! What is held depends on the DEM's width alone: for each column of level 0 10 KiB.
 
 use std::io::{Seek, Write};
 use std::ops::Range;
