@@ -1,6 +1,6 @@
 //! Light on the terrain: the sun's share and the sky's share of every sample, traced over the DEM's surface.
 //!
-//! `rays`, `crests` and `relief` find how high the terrain stands in a direction, `sun` and `sky` make light of it, [`light_levels`]
+//! `rays`, `crests` and `relief` find how high the terrain stands in a direction, `sun`, `sky` and `day` make light of it, [`light_levels`]
 //! and, row by row, [`LightLevels`] filter it into levels like the heights, and `fill` spreads each under its voids. All of it is traced
 //! over `S0`, level 0; no data, and what lies beyond the DEM, neither casts a shadow nor blocks the sky.
 //!

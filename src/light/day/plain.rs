@@ -47,9 +47,9 @@ pub(crate) fn day_levels(grid: &Grid, trace: &[LitTimes], filter: &Filter) -> Re
         values
     });
     // From softness to mean square: what is filtered.
-    for n in 0..trace.len() {
-        for [time, soft] in [[0, 1], [2, 3]] {
-            let (time, soft) = (fields[time][n], &mut fields[soft][n]);
+    let [first, first_soft, last, last_soft, _] = &mut fields;
+    for (times, softs) in [(first, first_soft), (last, last_soft)] {
+        for (soft, &mut time) in softs.iter_mut().zip(times) {
             *soft = time * time + 0.25 * *soft * *soft;
         }
     }
