@@ -8,14 +8,17 @@
 //! three promises, flown in turn. The bench checks that a frame that is updated again draws the same.
 #![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
+#[path = "support/rounds.rs"]
+mod rounds;
+
 use std::time::Instant;
 
 use clipscape::camera::{Flight, View};
 use clipscape::clipmap::{Clipmap, ClipmapOptions, certify};
 use clipscape::progress::Silent;
-use clipscape::stats::percentile;
 use clipscape::stream::Terrain;
 use clipscape::{Error, Result};
+use rounds::median;
 
 const SIZE_PX: [u32; 2] = [1280, 720];
 
@@ -90,11 +93,11 @@ fn run(rounds: usize, input: &str, flight: &str) -> Result<()> {
         let most = row.certified_px.iter().copied().fold(0.0, f64::max);
         println!(
             "{clip_size}, {promise}: {:.2}, {:.2}, {:.2}; {:.0}; {:.2}, {most:.2}",
-            median(row.update_ms),
-            median(row.select_ms),
-            median(row.certify_ms),
-            median(row.triangles),
-            median(row.certified_px)
+            median(&row.update_ms),
+            median(&row.select_ms),
+            median(&row.certify_ms),
+            median(&row.triangles),
+            median(&row.certified_px)
         );
     }
     Ok(())
@@ -119,9 +122,4 @@ fn fly(clipmap: &mut Clipmap, terrain: &Terrain, view: &View, time_s: f64, row: 
         return Err(Error::new(clipscape::ErrorKind::Misuse, "selection", what));
     }
     Ok(())
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    percentile(&values, 50.0)
 }

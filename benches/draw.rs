@@ -27,7 +27,8 @@ use clipscape::progress::Silent;
 use clipscape::render::Headless;
 use clipscape::stream::Terrain;
 use clipscape::{Flight, Result};
-use support::{Targets, median, met, module, options, percentile, pipeline, shader_constants};
+use support::rounds::{median, percentile};
+use support::{Targets, met, module, options, pipeline, shader_constants};
 use wgpu::util::DeviceExt as _;
 
 const SIZES_PX: [[u32; 2]; 2] = [[1280, 720], [16, 9]];

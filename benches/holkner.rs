@@ -10,16 +10,18 @@
 //! are medians over the rounds, of frames drawn to completion without reading back.
 #![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
+#[path = "support/rounds.rs"]
+mod rounds;
+
 use clipscape::camera::Camera;
 use clipscape::clipmap::ClipmapOptions;
 use clipscape::grid::{Grid, PATCH, Rect};
 use clipscape::levels::{Arrival, Bounds, Levels, LightSample};
-use clipscape::light::Sun;
 use clipscape::render::{Headless, HeadlessOptions};
-use clipscape::shade::ViewMode;
 use clipscape::source::Synth;
 use clipscape::{Error, ErrorKind, Result};
 use glam::DVec3;
+use rounds::median;
 
 const SMALL: i64 = 1024;
 const LARGE: i64 = 8192;
@@ -97,14 +99,8 @@ impl Setting<'_> {
     }
 
     fn fps(&self) -> f64 {
-        1e3 / median(self.draw_ms.iter().copied())
+        1e3 / median(&self.draw_ms)
     }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    clipscape::stats::percentile(&sorted, 50.0)
 }
 
 fn main() {
@@ -183,18 +179,14 @@ fn setting<'a>(
 ) -> Result<Setting<'a>> {
     let options = HeadlessOptions {
         size_px,
-        sample_count: 1,
-        view_mode: ViewMode::Shaded,
-        tint: true,
-        haze: true,
         traced_light: false,
-        sun: Sun::default(),
         clipmap: ClipmapOptions {
             clip_size,
             levels: Some(levels),
             cull: false,
             ..Default::default()
         },
+        ..Default::default()
     };
     let middle = SMALL / 2 + first;
     let mut ground = [0.0];

@@ -5,6 +5,9 @@
 //! Printed are medians over the rounds. Results of one core and of all must be the same, to the bit.
 #![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
+#[path = "support/rounds.rs"]
+mod rounds;
+
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -14,21 +17,12 @@ use clipscape::light::{Sun, sky_share, sun_share};
 use clipscape::progress::Silent;
 use clipscape::source;
 use clipscape::work::{Serial, Work};
+use rounds::{median, rounds_and_dems};
 
 fn main() {
-    let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench").peekable();
-    let rounds = match arguments.peek().and_then(|a| a.parse().ok()) {
-        Some(rounds) => {
-            arguments.next();
-            rounds
-        }
-        None => 3,
-    };
-    let named: Vec<String> = arguments.collect();
-    let shipped = ["data/N42E001.hgt", "synth:2048:7"].map(String::from);
-    let dems = if named.is_empty() { &shipped[..] } else { &named };
+    let (rounds, dems) = rounds_and_dems(3, "synth:2048:7");
     println!("DEM, size, light: s and ns a sample on all cores, on one");
-    for dem in dems {
+    for dem in &dems {
         if let Err(error) = table(dem, rounds) {
             println!("light: {error}");
             std::process::exit(1);
@@ -66,11 +60,7 @@ fn table(dem: &str, rounds: usize) -> Result<()> {
             all_s.push(all.0);
             one_s.push(one.0);
         }
-        let median = |times: &mut Vec<f64>| {
-            times.sort_by(f64::total_cmp);
-            times[times.len() / 2]
-        };
-        let (all, one) = (median(&mut all_s), median(&mut one_s));
+        let (all, one) = (median(&all_s), median(&one_s));
         let ns = |seconds: f64| seconds * 1e9 / grid.size.samples() as f64;
         println!(
             "{dem}, {} x {}, {name}: {all:.3} s, {:.0} ns; {one:.3} s, {:.0} ns{}",

@@ -26,7 +26,8 @@ use clipscape::render::Headless;
 use clipscape::source::Synth;
 use glam::DVec3;
 use support::mesh::Mesh;
-use support::{Targets, median, met, options, percentile};
+use support::rounds::{median, percentile};
+use support::{Targets, met, options};
 
 /// Screen errors of a frame's terrain pixels in pixels.
 fn screen_errors(depth: &[f32], view: &View, pyramid: &Pyramid) -> Vec<f64> {

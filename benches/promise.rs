@@ -27,7 +27,8 @@ use clipscape::stream::Terrain;
 use clipscape::{Error, ErrorKind, Result};
 use glam::DVec3;
 use support::mesh::Mesh;
-use support::{Targets, median, met, options};
+use support::rounds::median;
+use support::{Targets, met, options};
 
 const SIZE_PX: [u32; 2] = [1280, 720];
 

@@ -8,6 +8,9 @@
 //! closed forms (a plane, a spike, a cone) is told by `cargo test --test truth -- --nocapture`.
 #![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
+#[path = "support/rounds.rs"]
+mod rounds;
+
 use std::time::Instant;
 
 use clipscape::build::Threads;
@@ -19,6 +22,7 @@ use clipscape::stream::Terrain;
 use clipscape::work::{Work, each_chunk};
 use clipscape::{Error, Result};
 use glam::DVec3;
+use rounds::{median, rounds_and_dems};
 
 const SIZE_PX: [u32; 2] = [1280, 720];
 
@@ -26,19 +30,9 @@ const SIZE_PX: [u32; 2] = [1280, 720];
 const PLAIN_ROWS: usize = 7;
 
 fn main() {
-    let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench").peekable();
-    let rounds = match arguments.peek().and_then(|a| a.parse().ok()) {
-        Some(rounds) => {
-            arguments.next();
-            rounds
-        }
-        None => 5,
-    };
-    let named: Vec<String> = arguments.collect();
-    let shipped = ["data/N42E001.hgt", "synth:4096:7"].map(String::from);
-    let dems = if named.is_empty() { &shipped[..] } else { &named };
+    let (rounds, dems) = rounds_and_dems(5, "synth:4096:7");
     println!("DEM, size, frame: Mray/s fast, plain; times as fast; hits; unlike the plain caster's");
-    for dem in dems {
+    for dem in &dems {
         if let Err(error) = table(dem, rounds) {
             println!("rays: {error}");
             std::process::exit(1);
@@ -73,7 +67,7 @@ fn table(dem: &str, rounds: usize) -> Result<()> {
             let rows = fast.chunks(width).step_by(PLAIN_ROWS).flatten();
             unlike = rows.zip(&slow).filter(|(a, b)| !alike(a, b)).count();
         }
-        let (fast, plain) = (median(&mut fast_mray), median(&mut plain_mray));
+        let (fast, plain) = (median(&fast_mray), median(&plain_mray));
         println!(
             "{dem}, {} x {}, {name}: {fast:.2}, {plain:.2}; {:.1}; {hits}; {unlike}",
             size.width,
@@ -124,11 +118,6 @@ fn each_pixel(
         *out = cast([x as f64 + 0.5, row as f64 + 0.5])?;
     }
     Ok(())
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// The whole DEM, a look along a valley's height, and one straight ahead close to the ground.

@@ -36,3 +36,14 @@ pub fn each_chunk<T: Send>(
         task(index, &mut chunk);
     });
 }
+
+/// Splits `rows`, each `width` long, into stripes of `columns` columns: of each stripe its part of every row.
+pub(crate) fn split_columns<T>(rows: &mut [T], width: usize, columns: usize) -> Vec<Vec<&mut [T]>> {
+    let mut stripes: Vec<Vec<&mut [T]>> = (0..width.div_ceil(columns)).map(|_| Vec::new()).collect();
+    for row in rows.chunks_mut(width) {
+        for (stripe, part) in stripes.iter_mut().zip(row.chunks_mut(columns)) {
+            stripe.push(part);
+        }
+    }
+    stripes
+}

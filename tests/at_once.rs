@@ -303,17 +303,14 @@ fn picture(gpu: &clipscape::gpu::Gpu, levels: &dyn Levels, wait: Wait, shift_m: 
 
     let options = HeadlessOptions {
         size_px: SIZE_PX,
-        sample_count: 1,
         view_mode: clipscape::shade::ViewMode::Shaded,
-        tint: true,
-        haze: true,
         traced_light: false,
-        sun: clipscape::light::Sun::default(),
         clipmap: ClipmapOptions {
             clip_size: 256,
             wait,
             ..OPTIONS
         },
+        ..Default::default()
     };
     let mut headless = Headless::new(gpu.clone(), levels, &options).unwrap();
     let camera = clipscape::Camera {

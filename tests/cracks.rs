@@ -23,11 +23,9 @@ use clipscape::build::Threads;
 use clipscape::camera::{Camera, View};
 use clipscape::clipmap::{Clipmap, ClipmapOptions, Drawn, Wait};
 use clipscape::levels::Levels;
-use clipscape::light::Sun;
 use clipscape::progress::Silent;
 use clipscape::query::{S0, Surface};
 use clipscape::render::{Headless, HeadlessOptions};
-use clipscape::shade::ViewMode;
 use clipscape::stream::Terrain;
 use glam::DVec3;
 use support::depths::Depths;
@@ -348,12 +346,8 @@ fn headless_frames_count_their_cracks_where_they_are_measured() {
         let options = HeadlessOptions {
             size_px: [96, 64],
             sample_count,
-            view_mode: ViewMode::Shaded,
-            tint: true,
-            haze: true,
-            traced_light: true,
-            sun: Sun::default(),
             clipmap: ClipmapOptions::default(),
+            ..Default::default()
         };
         let mut headless = Headless::new(gpu.clone(), &terrain, &options).unwrap();
         let plain = headless.frame(&terrain, &camera, 0.0).unwrap();

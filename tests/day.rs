@@ -127,7 +127,7 @@ fn at_its_positions_a_day_is_lit_as_by_single_suns() {
     ] {
         let day = day(date, 48);
         let trace = trace_day(&dem.heights, &dem.grid, &earth, &day, &threads, &Silent).unwrap();
-        let of_day = day_levels(&dem.grid, &dem.heights, trace, &filter, &threads, &Silent).unwrap();
+        let of_day = day_levels(&dem.grid, &trace, &filter, &threads, &Silent).unwrap();
         let mut worst = [[0.0f64; 2]; 4];
         for k in [4, 8, 12, 20, 30, 38, 43] {
             let time = day.time_of_position(k);
@@ -176,7 +176,7 @@ fn shaded_between(heights: &[f32], grid: &Grid, day: &Day) -> f64 {
             let is_up = altitude > tangent.atan();
             lit += u64::from(is_up);
             let time = time as f32;
-            shaded += u64::from(!is_up && trace.first[n] < time && time < trace.last[n]);
+            shaded += u64::from(!is_up && trace[n].first < time && time < trace[n].last);
         }
     }
     shaded as f64 / lit as f64

@@ -108,17 +108,16 @@ fn camera() -> Camera {
 fn draw(gpu: &clipscape::gpu::Gpu, terrain: &Terrain, clip_size: i64, time: Option<f64>) -> Vec<u8> {
     let options = HeadlessOptions {
         size_px: SIZE_PX,
-        sample_count: 1,
         view_mode: ViewMode::Light,
         tint: false,
         haze: false,
-        traced_light: true,
         sun: terrain.sun().unwrap(),
         clipmap: ClipmapOptions {
             clip_size,
             day: time.is_some(),
             ..Default::default()
         },
+        ..Default::default()
     };
     let mut headless = Headless::new(gpu.clone(), terrain, &options).unwrap();
     if let Some(time) = time {
@@ -177,17 +176,15 @@ fn a_terrain_without_a_day_says_so() {
     let terrain = Terrain::open("data/N42E001.hgt", &Silent).unwrap();
     let options = HeadlessOptions {
         size_px: [8, 8],
-        sample_count: 1,
         view_mode: ViewMode::Light,
         tint: false,
         haze: false,
-        traced_light: true,
-        sun: clipscape::light::Sun::default(),
         clipmap: ClipmapOptions {
             clip_size: 64,
             day: true,
             ..Default::default()
         },
+        ..Default::default()
     };
     let mut headless = Headless::new(gpu, &terrain, &options).unwrap();
     let day = Day::of("2026-10-10T12:00Z".parse().unwrap(), 42.5, 1.5, 24).unwrap();

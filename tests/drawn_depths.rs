@@ -10,10 +10,8 @@ use clipscape::camera::{Camera, View};
 use clipscape::clipmap::{ClipmapOptions, Drawn, near_m};
 use clipscape::grid::Grid;
 use clipscape::levels::Levels;
-use clipscape::light::Sun;
 use clipscape::query::Picker;
 use clipscape::render::{Headless, HeadlessOptions};
-use clipscape::shade::ViewMode;
 use glam::DVec3;
 use support::{Random, gpu, hills, seed};
 use surfaces::{Diagonal, Oracle, pyramid, rough, small};
@@ -23,16 +21,14 @@ const SIZE_PX: [u32; 2] = [96, 80];
 fn headless(gpu: clipscape::gpu::Gpu, levels: &dyn Levels, vertical_scale: f64) -> Headless {
     let options = HeadlessOptions {
         size_px: SIZE_PX,
-        sample_count: 1,
-        view_mode: ViewMode::Shaded,
         tint: false,
         haze: false,
         traced_light: false,
-        sun: Sun::default(),
         clipmap: ClipmapOptions {
             vertical_scale,
             ..small(64)
         },
+        ..Default::default()
     };
     Headless::new(gpu, levels, &options).unwrap()
 }

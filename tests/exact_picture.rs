@@ -20,7 +20,6 @@ use clipscape::levels::Levels;
 use clipscape::light::Sun;
 use clipscape::query::Truth;
 use clipscape::render::{Headless, HeadlessOptions};
-use clipscape::shade::ViewMode;
 use glam::DVec3;
 use support::{Formula, Random, gpu, hills, seed};
 use surfaces::pyramid;
@@ -40,8 +39,6 @@ struct Scene<'a> {
 fn pictures(gpu: &clipscape::gpu::Gpu, scene: &Scene<'_>, camera: Camera, exact: &Look) -> [Vec<u8>; 2] {
     let options = HeadlessOptions {
         size_px: SIZE_PX,
-        sample_count: 1,
-        view_mode: ViewMode::Shaded,
         tint: scene.look.tint,
         haze: scene.look.haze,
         traced_light: scene.look.traced_light,
@@ -52,6 +49,7 @@ fn pictures(gpu: &clipscape::gpu::Gpu, scene: &Scene<'_>, camera: Camera, exact:
             vertical_scale: scene.vertical_scale,
             ..Default::default()
         },
+        ..Default::default()
     };
     let mut headless = Headless::new(gpu.clone(), scene.levels, &options).unwrap();
     let drawn = headless.frame(scene.levels, &camera, 0.0).unwrap().rgba8;

@@ -14,10 +14,8 @@ use clipscape::camera::Key;
 use clipscape::clipmap::{ClipmapOptions, near_m};
 use clipscape::grid::Grid;
 use clipscape::levels::Levels;
-use clipscape::light::Sun;
 use clipscape::query::Truth;
 use clipscape::render::{Headless, HeadlessOptions};
-use clipscape::shade::ViewMode;
 use exr::prelude::{AnyChannel, AnyChannels};
 use exr::prelude::{Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
 use glam::DVec3;
@@ -51,17 +49,13 @@ fn a_frame_written_as_distances_scores_as_it_measures() {
     for vertical_scale in [1.0, 2.0] {
         let options = HeadlessOptions {
             size_px: SIZE_PX,
-            sample_count: 1,
-            view_mode: ViewMode::Shaded,
-            tint: true,
-            haze: true,
             traced_light: false,
-            sun: Sun::default(),
             clipmap: ClipmapOptions {
                 clip_size: 64,
                 vertical_scale,
                 ..Default::default()
             },
+            ..Default::default()
         };
         let camera = Camera {
             eye: DVec3::new(3000.0, 1500.0, 9000.0),

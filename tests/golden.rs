@@ -67,13 +67,8 @@ fn pyrenees() -> &'static Pyramid {
 fn options() -> HeadlessOptions {
     HeadlessOptions {
         size_px: SIZE_PX,
-        sample_count: 1,
-        view_mode: ViewMode::Shaded,
-        tint: true,
-        haze: true,
-        traced_light: true,
-        sun: Sun::default(),
         clipmap: ClipmapOptions::default(),
+        ..Default::default()
     }
 }
 

@@ -10,7 +10,6 @@ use clipscape::grid::{Grid, PATCH};
 use clipscape::levels::Levels;
 use clipscape::light::Sun;
 use clipscape::render::{Headless, HeadlessOptions};
-use clipscape::shade::ViewMode;
 use glam::DVec3;
 use glam::dcamera::rh::proj::directx;
 use glam::dcamera::rh::view::look_to_mat4;
@@ -61,11 +60,6 @@ fn off_axis(camera: &Camera, random: &mut Random) -> View {
 fn options(clip_size: i64, size_px: [u32; 2]) -> HeadlessOptions {
     HeadlessOptions {
         size_px,
-        sample_count: 1,
-        view_mode: ViewMode::Shaded,
-        tint: true,
-        haze: true,
-        traced_light: true,
         sun: Sun {
             azimuth_deg: 315.0,
             altitude_deg: 45.0,
@@ -74,6 +68,7 @@ fn options(clip_size: i64, size_px: [u32; 2]) -> HeadlessOptions {
             clip_size,
             ..Default::default()
         },
+        ..Default::default()
     }
 }
 

@@ -77,9 +77,7 @@ fn frames_that_wait_do_not_depend_on_who_loads() {
 #[cfg(feature = "gpu")]
 #[test]
 fn pictures_that_wait_do_not_depend_on_who_loads() {
-    use clipscape::light::Sun;
     use clipscape::render::{Headless, HeadlessOptions};
-    use clipscape::shade::ViewMode;
 
     let Some(gpu) = support::gpu() else { return };
     let folder = tempfile::tempdir().unwrap();
@@ -87,13 +85,8 @@ fn pictures_that_wait_do_not_depend_on_who_loads() {
     make_file(&Rough::new(900, 700), &path);
     let headless_options = HeadlessOptions {
         size_px: [160, 90],
-        sample_count: 1,
-        view_mode: ViewMode::Shaded,
-        tint: true,
-        haze: true,
-        traced_light: true,
-        sun: Sun::default(),
         clipmap: options(Wait::All),
+        ..Default::default()
     };
     let fly = |loaders| {
         let terrain = with_loaders(Terrain::open(&path, &Silent).unwrap(), loaders);

@@ -164,13 +164,11 @@ fn an_encoder_that_is_dropped_costs_whole_windows_and_nothing_else() {
 
     // It may not be drawn any more,
     let mut encoder = stage.encoder();
-    stage.pass(&mut encoder, &target, |pass| {
-        let error = stage
-            .renderer
-            .draw(pass, &eye.clipmap, &eye.textures)
-            .unwrap_err();
-        assert_eq!(error.kind(), ErrorKind::Misuse);
-    });
+    let error = stage
+        .renderer
+        .draw(&mut target.pass(&mut encoder, None), &eye.clipmap, &eye.textures)
+        .unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Misuse);
     // but uploaded again, either as it was or as of the next update.
     let mut again = stage.encoder();
     stage.record(&mut again, &mut eye, &target);
@@ -192,9 +190,7 @@ fn an_encoder_that_is_dropped_costs_whole_windows_and_nothing_else() {
         .upload(&mut encoder, &eye.clipmap, &mut eye.textures)
         .unwrap();
     assert!(whole.bytes > 10 * exposed.bytes, "{whole:?} {exposed:?}");
-    stage.pass(&mut encoder, &target, |pass| {
-        stage.renderer.draw(pass, &eye.clipmap, &eye.textures).unwrap();
-    });
+    stage.draw(&mut encoder, &eye, &target);
     stage.gpu.queue.submit([encoder.finish()]);
     assert!(stage.colours(&target) == wanted[3]);
     assert_eq!(stale(&stage, &eye), 0);
@@ -237,10 +233,12 @@ fn textures_of_another_clipmap_are_written_whole_or_refused() {
     std::mem::swap(&mut eye.textures, &mut other.textures);
     let target = stage.target();
     let mut encoder = stage.encoder();
-    stage.pass(&mut encoder, &target, |pass| {
-        let drawn = stage.renderer.draw(pass, &other.clipmap, &other.textures);
-        assert_eq!(drawn.unwrap_err().kind(), ErrorKind::Misuse);
-    });
+    let drawn = stage.renderer.draw(
+        &mut target.pass(&mut encoder, None),
+        &other.clipmap,
+        &other.textures,
+    );
+    assert_eq!(drawn.unwrap_err().kind(), ErrorKind::Misuse);
     assert!(wanted == stage.colours(&stage.picture(&raised, &mut other, &here)));
     assert_eq!(stale(&stage, &other), 0);
 

@@ -11,10 +11,8 @@ use clipscape::clipmap::ClipmapOptions;
 use clipscape::gpu::{self, Gpu};
 use clipscape::grid::{Grid, PATCH, Rect};
 use clipscape::levels::{Arrival, Bounds, Levels, LightSample};
-use clipscape::light::Sun;
 use clipscape::query::{S0, Surface};
 use clipscape::render::{Headless, HeadlessOptions};
-use clipscape::shade::ViewMode;
 use clipscape::source::Synth;
 use clipscape::stats::percentile;
 use clipscape::{Error, ErrorKind, Result};
@@ -158,17 +156,13 @@ fn compare(
 ) -> Result<[Taken; 3]> {
     let options = HeadlessOptions {
         size_px: [640, 360],
-        sample_count: 1,
-        view_mode: ViewMode::Shaded,
-        tint: true,
-        haze: true,
         traced_light: false,
-        sun: Sun::default(),
         clipmap: ClipmapOptions {
             clip_size: CLIP_SIZE,
             levels: Some(levels),
             ..Default::default()
         },
+        ..Default::default()
     };
     let mut views = Vec::new();
     for (_, terrain) in terrains {

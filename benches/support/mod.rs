@@ -3,14 +3,13 @@
 #![allow(dead_code, reason = "each bench uses its own part of this")]
 
 pub mod mesh;
+pub mod rounds;
 
 use std::time::Instant;
 
 use clipscape::clipmap::ClipmapOptions;
-use clipscape::gpu::{Gpu, Parts};
-use clipscape::light::Sun;
+use clipscape::gpu::{Gpu, Parts, RendererOptions};
 use clipscape::render::{COLOUR_FORMAT, Headless, HeadlessOptions};
-use clipscape::shade::ViewMode;
 use clipscape::{Error, ErrorKind, Result};
 
 /// The depth format drawn into, as [`Headless`] does.
@@ -20,17 +19,13 @@ const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub fn options(size_px: [u32; 2], cull: bool) -> HeadlessOptions {
     HeadlessOptions {
         size_px,
-        sample_count: 1,
-        view_mode: ViewMode::Shaded,
-        tint: true,
-        haze: true,
         traced_light: false,
-        sun: Sun::default(),
         clipmap: ClipmapOptions {
             clip_size: 256,
             cull,
             ..Default::default()
         },
+        ..Default::default()
     }
 }
 
@@ -44,18 +39,21 @@ pub fn shader_constants() -> [(&'static str, f64); 4] {
     ]
 }
 
-/// A colour and a depth texture.
+/// What is drawn into.
 pub struct Targets {
     gpu: Gpu,
-    colour: wgpu::Texture,
-    depth: wgpu::Texture,
+    targets: clipscape::gpu::Targets,
 }
 
 impl Targets {
     pub fn new(gpu: &Gpu, size_px: [u32; 2]) -> Self {
+        let options = RendererOptions {
+            colour_format: COLOUR_FORMAT,
+            depth_format: DEPTH_FORMAT,
+            ..Default::default()
+        };
         Self {
-            colour: gpu.target("clipscape bench colour", size_px, COLOUR_FORMAT),
-            depth: gpu.target("clipscape bench depth", size_px, DEPTH_FORMAT),
+            targets: clipscape::gpu::Targets::new(gpu, size_px, &options),
             gpu: gpu.clone(),
         }
     }
@@ -63,29 +61,8 @@ impl Targets {
     /// Clears and draws; wall milliseconds from recording until the device is done.
     pub fn draw_ms(&self, draw: impl FnOnce(&mut wgpu::RenderPass<'_>)) -> Result<f64> {
         let start = Instant::now();
-        let [colour, depth] = [&self.colour, &self.depth].map(|t| t.create_view(&Default::default()));
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("clipscape bench"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &colour,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &depth,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Store,
-                }),
-                stencil_ops: None,
-            }),
-            ..Default::default()
-        });
+        let mut pass = self.targets.pass(&mut encoder, None);
         draw(&mut pass);
         drop(pass);
         self.gpu.queue.submit([encoder.finish()]);
@@ -106,9 +83,9 @@ impl Targets {
 
     /// Red, green, blue, alpha of each pixel, and the depths.
     pub fn read(&self) -> Result<(Vec<u8>, Vec<f32>)> {
-        let depth = self.gpu.read_texture(&self.depth, 0)?;
+        let depth = self.gpu.read_texture(self.targets.depth(), 0)?;
         Ok((
-            self.gpu.read_texture(&self.colour, 0)?,
+            self.gpu.read_texture(self.targets.colour(), 0)?,
             bytemuck::pod_collect_to_vec(&depth),
         ))
     }
@@ -182,17 +159,6 @@ pub fn module(gpu: &Gpu, name: &str, text: &str) -> Result<wgpu::ShaderModule> {
         label: Some(name),
         source: wgpu::ShaderSource::Wgsl(composed.source.into()),
     }))
-}
-
-/// The `percent`-th percentile of values in any order.
-pub fn percentile(values: &[f64], percent: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    clipscape::stats::percentile(&sorted, percent)
-}
-
-pub fn median(values: &[f64]) -> f64 {
-    percentile(values, 50.0)
 }
 
 /// `met` where an aim is met.

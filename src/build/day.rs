@@ -1,28 +1,29 @@
-//! The fourth pass: light over a day traced over the heights of a terrain file, put as tiles where that was just written.
+//! The fourth pass: light over a day, traced over the heights of a terrain file.
 //!
-//! Level 0 and all that is known of its day are held whole, which [`super::memory`] counts.
+//! What is held depends on the DEM's width alone: for each column of level 0 10 KiB.
 
 use std::io::{Seek, Write};
+use std::ops::Range;
 use std::time::Instant;
 
-use super::tiles::{Tiles, put_tiles};
-use crate::error::{Error, Result};
-use crate::grid::Rect;
-use crate::levels::{Arrival, DaySample, Levels};
-use crate::light::{Day, Earth, day_levels, trace_day};
+use super::blocks::{Blocks, Traced};
+use crate::error::Result;
+use crate::grid::Grid;
+use crate::levels::Levels;
+use crate::light::{Day, DayLevels, Daylight, Earth, LitTimes, Relief};
 use crate::progress::Progress;
 use crate::pyramid::Filter;
-use crate::terrain::layout::{Kind, TILE};
-use crate::terrain::{DAY_FIELDS, TerrainFile, TerrainWriter};
+use crate::terrain::layout::Kind;
+use crate::terrain::{DAY_FIELDS, TerrainWriter, pack_columns};
 use crate::work::Work;
 
-/// Traces the light of `day` over `heights` on `earth`, filters it into all levels and puts them. Returns the seconds of
+/// Traces the light of `day` over `blocks` on `earth`, filters it into all levels and puts them. Returns the seconds of
 /// tracing and filtering, and of writing.
 ///
 /// # Errors
 /// Those of tracing and of the file; [`crate::ErrorKind::Cancelled`].
 pub(super) fn write_day<W: Write + Seek + Sync + Send>(
-    heights: &TerrainFile,
+    blocks: &Blocks<'_>,
     writer: &mut TerrainWriter<W>,
     day: &Day,
     earth: &Earth,
@@ -31,68 +32,69 @@ pub(super) fn write_day<W: Write + Seek + Sync + Send>(
     progress: &dyn Progress,
 ) -> Result<[f64; 2]> {
     let start = Instant::now();
-    let levels = trace(heights, day, earth, filter, work, progress)?;
-    let traced_s = start.elapsed().as_secs_f64();
-    let start = Instant::now();
-    let grid = *heights.grid();
-    let order = writer.layout().order_of(Kind::Day);
-    progress.begin("write day", order.len() as u64);
-    for row in order {
-        let level = writer.layout().parts()[row.part].level;
-        let size = grid.level(level);
-        let rows = row.y * TILE..((row.y + 1) * TILE).min(size.height);
-        let samples =
-            &levels[level as usize][(rows.start * size.width) as usize..(rows.end * size.width) as usize];
-        let samples: Vec<[u16; 5]> = samples.iter().map(fields).collect();
-        let tiles = Tiles {
-            row,
-            width: size.width,
-            samples: &samples,
-            fields: DAY_FIELDS,
-        };
-        put_tiles(writer, &tiles, work, progress)?;
-        progress.advance(1);
+    let grid = *blocks.heights().grid();
+    let mut times = Times {
+        grid,
+        light: Daylight::new(&grid, earth, day)?,
+        levels: DayLevels::new(&grid, filter),
+        traced: Vec::new(),
+        ready: (0, 0..0),
+    };
+    let write_s = blocks.write(&mut times, writer, work, progress)?;
+    Ok([start.elapsed().as_secs_f64() - write_s, write_s])
+}
+
+/// The times of first and last light.
+struct Times {
+    grid: Grid,
+    light: Daylight,
+    levels: DayLevels,
+    /// Of the rows that were traced last.
+    traced: Vec<LitTimes>,
+    /// The level and its rows that are ready.
+    ready: (u32, Range<i64>),
+}
+
+impl Traced for Times {
+    const KIND: Kind = Kind::Day;
+    const NAME: &str = "day";
+    const SAMPLE_BYTES: usize = 10;
+
+    fn trace(
+        &mut self,
+        relief: &Relief<'_>,
+        rows: Range<i64>,
+        work: &dyn Work,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let count = (rows.end - rows.start) * self.grid.size.width;
+        self.traced.resize(count as usize, LitTimes::default());
+        self.light.rows(relief, rows, &mut self.traced, work, progress)
     }
-    Ok([traced_s, start.elapsed().as_secs_f64()])
-}
 
-/// A sample without what only fills its words.
-fn fields(sample: &DaySample) -> [u16; 5] {
-    let all: [u16; 6] = bytemuck::cast(*sample);
-    [all[0], all[1], all[2], all[3], all[4]]
-}
-
-/// The light over `day` of all levels of `heights` on `earth`.
-///
-/// # Errors
-/// Those of tracing and of the file; [`crate::ErrorKind::Cancelled`].
-fn trace(
-    heights: &TerrainFile,
-    day: &Day,
-    earth: &Earth,
-    filter: &Filter,
-    work: &dyn Work,
-    progress: &dyn Progress,
-) -> Result<Vec<Vec<DaySample>>> {
-    let level_0 = read_level_0(heights, progress)?;
-    let traced = trace_day(&level_0, heights.grid(), earth, day, work, progress)?;
-    day_levels(heights.grid(), &level_0, traced, filter, work, progress)
-}
-
-/// All heights of level 0, a row of tiles at a time.
-fn read_level_0(file: &TerrainFile, progress: &dyn Progress) -> Result<Vec<f32>> {
-    let size = file.grid().size;
-    let mut heights = vec![f32::NAN; size.samples() as usize];
-    progress.begin("read back", heights.len() as u64);
-    let rows = heights.chunks_mut((TILE * size.width) as usize);
-    for (z0, rows) in (0..size.height).step_by(TILE as usize).zip(rows) {
-        if progress.cancelled() {
-            return Err(Error::cancelled(file.name()));
-        }
-        let rect = Rect::new(0, z0, size.width, (z0 + TILE).min(size.height));
-        let arrival = file.heights(0, rect, rows)?;
-        debug_assert_eq!(arrival, Arrival::Arrived, "a file has all of its tiles");
-        progress.advance(rows.len() as u64);
+    fn filter(&mut self, rows: Range<i64>, work: &dyn Work) {
+        let width = self.grid.size.width;
+        let rows = (rows.start * width) as usize..(rows.end * width) as usize;
+        self.levels.take(&self.traced[rows], work);
     }
-    Ok(heights)
+
+    fn known(&self, level: u32) -> i64 {
+        self.levels.known(level)
+    }
+
+    fn ready(&mut self, level: u32, rows: Range<i64>, _work: &dyn Work) {
+        self.ready = (level, rows);
+    }
+
+    fn pack(&self, columns: Range<i64>) -> Vec<u8> {
+        let (level, rows) = self.ready.clone();
+        let width = self.grid.level(level).width;
+        let samples: &[[u16; 5]] = bytemuck::cast_slice(self.levels.rows(level, rows));
+        pack_columns(samples, width, columns, DAY_FIELDS)
+    }
+
+    fn forget(&mut self) {
+        let (level, rows) = &self.ready;
+        self.levels.forget(*level, rows.end);
+    }
 }

@@ -4,6 +4,7 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::time::Instant;
 
+use super::blocks::Blocks;
 use super::bounds::write_bounds;
 use super::day::write_day;
 use super::heights::write_heights;
@@ -130,12 +131,12 @@ pub fn preprocess(
         .map_err(|e| e.about(&description.name))?;
     check_day(options)?;
     let read: &dyn HeightSource = destepped.as_ref().map_or(source, |destepped| destepped);
-    let needed = |grid: &Grid| preprocess_bytes(grid, options.light.is_some(), read.held_bytes());
-    let needed = |grid: &Grid| needed(grid).max(options.day.map_or(0, |_| memory::day_bytes(grid)));
-    let advice = if options.light.is_some() {
-        "leave out the light, or cut the DEM"
-    } else {
-        "or cut the DEM"
+    let (light, day) = (options.light.is_some(), options.day.is_some());
+    let needed = |grid: &Grid| preprocess_bytes(grid, light, day, read.held_bytes());
+    let advice = match (light, day) {
+        (_, true) => "leave out the day, or cut the DEM",
+        (true, _) => "leave out the light, or cut the DEM",
+        _ => "or cut the DEM",
     };
     memory::check(
         &description.name,
@@ -154,7 +155,7 @@ pub fn preprocess(
     // A step of level 1 is two of level 0: twice the quantum there is the same of slopes.
     let quanta_m = destepped.as_ref().map(|destepped| 2.0 * destepped.quantum_m());
     let rounding_step_m = quanta_m.or(rounding_step_m);
-    Layout::new(&description.grid, options.light.is_some(), options.day.is_some())
+    Layout::new(&description.grid, light, day)
         .map_err(|what| Error::new(ErrorKind::Limit, &description.name, what).advice("cut the DEM"))?;
     let threads = Threads::new(options.threads)?;
     let (output, file) = Output::create(out, options.force)?;
@@ -210,13 +211,14 @@ pub fn preprocess(
                 earth: &earth,
                 filter: &options.filter,
             };
-            let took = write_light(&heights, crests, &mut writer, &lit, &threads, progress)?;
+            let blocks = Blocks::new(&heights, crests);
+            let took = write_light(&blocks, &mut writer, &lit, &threads, progress)?;
             (report.sun_s, report.sky_s) = (took.sun_s, took.sky_s);
             report.write_s += took.write_s;
             if let Some(day) = &options.day {
                 let filter = &options.filter;
                 let [day_s, write_s] =
-                    write_day(&heights, &mut writer, day, &earth, filter, &threads, progress)?;
+                    write_day(&blocks, &mut writer, day, &earth, filter, &threads, progress)?;
                 report.day_s = day_s;
                 report.write_s += write_s;
             }

@@ -4,8 +4,9 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::time::Instant;
 
+use super::blocks::{Blocks, crests};
 use super::day::write_day;
-use super::light::{Lit, crests, write_light};
+use super::light::{Lit, write_light};
 use super::memory::{self, peak_rss_bytes, preprocess_bytes};
 use super::output::Output;
 use super::preprocess::{PreprocessOptions, PreprocessReport, check_day};
@@ -41,16 +42,18 @@ pub fn relight(
         light.sun.check()?;
         check_day(options)?;
         // The file's own cache is what holds tiles.
-        let needed = |grid: &Grid| {
-            let light = preprocess_bytes(grid, true, DEFAULT_CACHE_BYTES as u64);
-            light.max(options.day.map_or(0, |_| memory::day_bytes(grid)))
-        };
+        let day = options.day.is_some();
+        let needed = |grid: &Grid| preprocess_bytes(grid, true, day, DEFAULT_CACHE_BYTES as u64);
         memory::check(
             file.name(),
             grid,
             needed,
             options.memory_bytes,
-            "or leave out the light",
+            if day {
+                "or leave out the day"
+            } else {
+                "or leave out the light"
+            },
         )?;
     }
     let earth = Earth::of(grid, place.as_ref(), options.curvature).map_err(|e| e.about(file.name()))?;
@@ -94,16 +97,17 @@ pub fn relight(
                 earth: &earth,
                 filter: &filter,
             };
-            let took = write_light(file, crests, &mut writer, &lit, &threads, progress).map_err(named)?;
+            let blocks = Blocks::new(file, crests);
+            let took = write_light(&blocks, &mut writer, &lit, &threads, progress).map_err(named)?;
             report.sun_s += took.sun_s;
             report.sky_s = took.sky_s;
             report.write_s += took.write_s;
-        }
-        if let Some(day) = &options.day {
-            let made = write_day(file, &mut writer, day, &earth, &filter, &threads, progress);
-            let [day_s, write_s] = made.map_err(named)?;
-            report.day_s = day_s;
-            report.write_s += write_s;
+            if let Some(day) = &options.day {
+                let made = write_day(&blocks, &mut writer, day, &earth, &filter, &threads, progress);
+                let [day_s, write_s] = made.map_err(named)?;
+                report.day_s = day_s;
+                report.write_s += write_s;
+            }
         }
         let written = Instant::now();
         put_checks(&mut writer, &threads, progress).map_err(named)?;

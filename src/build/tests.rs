@@ -8,11 +8,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::*;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
-use crate::levels::Levels;
-use crate::light::{LightOptions, trace_light};
+use crate::levels::{Arrival, Bounds, DaySample, Levels, LightSample};
+use crate::light::{Day, Earth, LightOptions, plain_day, trace_light};
 use crate::progress::{Progress, Silent};
 use crate::pyramid::random::Random;
-use crate::pyramid::{DEFAULT_LOBES, Filter, FilterKind};
+use crate::pyramid::{DEFAULT_LOBES, Filter, FilterKind, Pyramid};
 use crate::source::{Description, HeightSource};
 use crate::terrain::TerrainFile;
 use crate::terrain::testing::all_bits;
@@ -142,11 +142,20 @@ fn a_file_holds_what_the_pyramid_holds() {
     }
 }
 
-/// The bytes of a streamed file, and of one that the plain version in memory writes.
-fn streamed_and_plain(hills: &Hills, options: &PreprocessOptions) -> (Vec<u8>, Vec<u8>) {
+/// The bytes of a streamed file.
+fn streamed(hills: &Hills, options: &PreprocessOptions) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("a.terrain.exr");
     preprocess(hills, &out, options, &Silent).unwrap();
+    fs::read(out).unwrap()
+}
+
+/// The bytes of the file that the plain version in memory writes where the streamed one describes itself as `like` does.
+fn plain(hills: &Hills, options: &PreprocessOptions, like: &[u8]) -> Vec<u8> {
+    let meta = TerrainFile::open("t", Arc::new(like.to_vec()))
+        .unwrap()
+        .meta()
+        .clone();
     let mut pyramid = build_pyramid(hills, &options.filter, &Silent).unwrap();
     if let Some(light) = &options.light {
         let heights = pyramid.level(0).to_vec();
@@ -154,9 +163,62 @@ fn streamed_and_plain(hills: &Hills, options: &PreprocessOptions) -> (Vec<u8>, V
         let traced = trace_light(&grid, &heights, light, &options.filter, &Serial, &Silent).unwrap();
         pyramid.set_light(traced).unwrap();
     }
-    let plain = std::io::Cursor::new(Vec::new());
-    let plain = crate::terrain::write(plain, open(&out).meta(), &pyramid, &Serial, &Silent).unwrap();
-    (fs::read(out).unwrap(), plain.into_inner())
+    let day = options.day.map(|day| {
+        let (grid, heights) = (hills.description.grid, pyramid.level(0));
+        let traced = plain_day::trace_day(heights, &grid, &Earth::default(), &day).unwrap();
+        plain_day::day_levels(&grid, &traced, &options.filter).unwrap()
+    });
+    let bytes = std::io::Cursor::new(Vec::new());
+    let levels = WithDay { pyramid, day };
+    crate::terrain::write(bytes, &meta, &levels, &Serial, &Silent)
+        .unwrap()
+        .into_inner()
+}
+
+/// A pyramid, and perhaps the light of a day, in memory.
+struct WithDay {
+    pyramid: Pyramid,
+    day: Option<Vec<Vec<DaySample>>>,
+}
+
+impl Levels for WithDay {
+    fn grid(&self) -> &Grid {
+        self.pyramid.grid()
+    }
+
+    fn heights(&self, level: u32, rect: Rect, out: &mut [f32]) -> Result<Arrival> {
+        self.pyramid.heights(level, rect, out)
+    }
+
+    fn bounds(&self, level: u32, patches: Rect, out: &mut [Bounds]) -> Result<Arrival> {
+        self.pyramid.bounds(level, patches, out)
+    }
+
+    fn has_light(&self) -> bool {
+        self.pyramid.has_light()
+    }
+
+    fn light(&self, level: u32, rect: Rect, out: &mut [LightSample]) -> Result<Arrival> {
+        self.pyramid.light(level, rect, out)
+    }
+
+    fn has_day(&self) -> bool {
+        self.day.is_some()
+    }
+
+    fn day(&self, level: u32, rect: Rect, out: &mut [DaySample]) -> Result<Arrival> {
+        let level_of_day = &self.day.as_ref().expect("asked for a day where there is none")[level as usize];
+        let width = self.grid().level(level).width;
+        for ((x, z), out) in rect.cells().zip(out) {
+            *out = level_of_day[(z * width + x) as usize];
+        }
+        Ok(Arrival::Arrived)
+    }
+}
+
+/// A day in the hills, from so many suns.
+fn day(positions: u32) -> Day {
+    Day::of("2026-12-21T12:00Z".parse().unwrap(), 42.0, 1.0, positions).unwrap()
 }
 
 #[test]
@@ -182,12 +244,13 @@ fn any_ceiling_and_any_threads_give_the_bytes_of_the_plain_version() {
         sky_directions,
     };
     for (width, height) in sizes {
-        for (voids, coast, light) in [
-            (0, 0, None),
-            (30, 0, None),
-            (3, 40, None),
-            (0, 0, Some(low(3))),
-            (30, 0, Some(low(0))),
+        for (voids, coast, light, day) in [
+            (0, 0, None, None),
+            (30, 0, None, None),
+            (3, 40, None, None),
+            (0, 0, Some(low(3)), None),
+            (30, 0, Some(low(0)), None),
+            (0, 0, Some(low(0)), Some(day(3))),
             (
                 3,
                 40,
@@ -195,6 +258,7 @@ fn any_ceiling_and_any_threads_give_the_bytes_of_the_plain_version() {
                     sky_directions: 1,
                     ..Default::default()
                 }),
+                Some(day(2)),
             ),
         ] {
             let hills = Hills {
@@ -202,40 +266,56 @@ fn any_ceiling_and_any_threads_give_the_bytes_of_the_plain_version() {
                 coast,
                 ..Hills::new(width, height)
             };
-            let lowest = preprocess_bytes(&hills.description.grid, light.is_some(), 0);
-            let mut first = None;
+            let lowest = preprocess_bytes(&hills.description.grid, light.is_some(), day.is_some(), 0);
+            let mut want = None;
             for (threads, memory_bytes) in [(1, lowest), (2, lowest), (1, 4 << 30), (2, 4 << 30)] {
                 let options = PreprocessOptions {
                     light,
+                    day,
                     memory_bytes,
                     ..options(threads)
                 };
-                let case =
-                    format!("{width} x {height}, voids {voids}, coast {coast}, {light:?}, {threads} threads");
-                let (streamed, plain) = streamed_and_plain(&hills, &options);
-                assert!(streamed == plain, "{case}");
-                assert!(
-                    streamed == *first.get_or_insert(plain),
-                    "{case}, {memory_bytes} bytes"
+                let case = format!(
+                    "{width} x {height}, voids {voids}, coast {coast}, {light:?}, {day:?}, {threads} threads"
                 );
+                let streamed = streamed(&hills, &options);
+                let want = want.get_or_insert_with(|| plain(&hills, &options, &streamed));
+                assert!(streamed == *want, "{case}, {memory_bytes} bytes");
             }
         }
     }
-    // Controls: another filter and other voids give other bytes.
+    // Controls: another filter, other voids and another day give other bytes.
     let hills = Hills::new(300, 300);
     let options = |filter: FilterKind| PreprocessOptions {
         light: None,
         filter: filter.into(),
         ..options(1)
     };
-    let (one, _) = streamed_and_plain(&hills, &options(FilterKind::default()));
-    let (other, _) = streamed_and_plain(&hills, &options(FilterKind::Cubic));
+    let one = streamed(&hills, &options(FilterKind::default()));
+    let other = streamed(&hills, &options(FilterKind::Cubic));
     let holed = Hills {
         voids: 4,
         ..Hills::new(300, 300)
     };
-    let (third, _) = streamed_and_plain(&holed, &options(FilterKind::default()));
+    let third = streamed(&holed, &options(FilterKind::default()));
     assert!(one != other && one != third);
+    let times = |hills: &Hills, day| {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("a.terrain.exr");
+        let options = PreprocessOptions {
+            light: Some(low(0)),
+            day: Some(day),
+            ..options(FilterKind::default())
+        };
+        preprocess(hills, &out, &options, &Silent).unwrap();
+        let mut samples = vec![DaySample::default(); 150 * 150];
+        let _ = open(&out)
+            .day(1, Rect::new(0, 0, 150, 150), &mut samples)
+            .unwrap();
+        samples
+    };
+    let three = times(&hills, day(3));
+    assert!(three != times(&hills, day(4)) && three != times(&holed, day(3)));
 }
 
 #[test]
@@ -337,8 +417,12 @@ fn cancelled_anywhere_nothing_is_left() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("a.terrain.exr");
     let mut cancelled = 0;
+    let options = PreprocessOptions {
+        day: Some(day(3)),
+        ..options(1)
+    };
     for n in (0..).step_by(3) {
-        match preprocess(&hills, &out, &options(1), &CancelAt(AtomicUsize::new(0), n)) {
+        match preprocess(&hills, &out, &options, &CancelAt(AtomicUsize::new(0), n)) {
             Ok(_) => break,
             Err(error) => {
                 assert_eq!(error.kind(), ErrorKind::Cancelled, "after {n}: {error}");
@@ -382,9 +466,18 @@ fn errors_are_one_line_and_leave_nothing() {
     };
     let error = error_of(&whole, &out, &little);
     assert_eq!(error.kind(), ErrorKind::Limit);
-    let needed = preprocess_bytes(&whole.description.grid, options(1).light.is_some(), 0).div_ceil(1 << 20);
+    let needed = |day| preprocess_bytes(&whole.description.grid, true, day, 0).div_ceil(1 << 20);
+    let said = |error: &Error, needed: u64| error.to_string().contains(&format!("need {needed} MiB"));
+    assert!(said(&error, needed(false)), "{error}");
+    let little_for_a_day = PreprocessOptions {
+        memory_bytes: needed(false) << 20,
+        day: Some(day(3)),
+        ..options(1)
+    };
+    let error = error_of(&whole, &out, &little_for_a_day);
+    assert_eq!(error.kind(), ErrorKind::Limit);
     assert!(
-        error.to_string().contains(&format!("need {needed} MiB")),
+        said(&error, needed(true)) && needed(true) > needed(false),
         "{error}"
     );
     let mut light = LightOptions::default();
@@ -446,6 +539,7 @@ fn a_terrain_file_is_lit_anew_and_keeps_its_heights() {
             },
             sky_directions: 3,
         }),
+        day: Some(day(3)),
         ..options(1)
     };
     preprocess(&hills, &other, &low, &Silent).unwrap();
@@ -471,6 +565,7 @@ fn a_terrain_file_is_lit_anew_and_keeps_its_heights() {
     };
     relight(&open(&second), &second, &force, &Silent).unwrap();
     assert_eq!(fs::read(&second).unwrap(), fs::read(&first).unwrap());
+    assert!(open(&other).has_day() && !open(&second).has_day());
     let dark = PreprocessOptions {
         light: None,
         ..force.clone()

@@ -13,7 +13,6 @@ use crate::levels::Levels;
 use crate::measure::{Effort, FILES, Folder, MeasureOptions, SettingLists, measure};
 use crate::progress::Progress;
 use crate::render::HeadlessOptions;
-use crate::shade::ViewMode;
 use crate::source;
 use crate::stats::Run;
 use crate::stream::Terrain;
@@ -50,13 +49,12 @@ pub(super) fn run(args: &MeasureArgs, terminal: &Terminal) -> Outcome {
         effort: effort(args),
         headless: HeadlessOptions {
             size_px,
-            sample_count: 1,
-            view_mode: ViewMode::Shaded,
             tint: !args.no_tint,
             haze: !args.no_haze,
             traced_light: terrain.has_light(),
             sun: terrain.sun().or(args.sun).unwrap_or_default(),
             clipmap,
+            ..Default::default()
         },
         memory_bytes: args.memory.unwrap_or(HELD_MEMORY_BYTES),
     };

@@ -3,8 +3,10 @@
 use glam::DVec3;
 
 use super::args::{CameraArgs, RenderArgs};
-use crate::camera::{Camera, CrsFlight, Flight, View, is_crs};
-use crate::error::Result;
+use crate::camera::{Camera, CrsFlight, Flight, MAX_EYE_M, View, is_crs, overview};
+use crate::clipmap::height_range_m;
+use crate::error::{Error, ErrorKind, Result};
+use crate::levels::Levels;
 use crate::query::Places;
 use crate::stream::Terrain;
 
@@ -21,6 +23,31 @@ pub(super) enum Shots {
 }
 
 impl Shots {
+    /// The flight or the camera that is asked for, or a view of the whole.
+    ///
+    /// # Errors
+    /// For a place off the terrain, and heights beyond any camera's; those of reading the terrain.
+    pub(super) fn of(args: &RenderArgs, flight: Option<Flight>, terrain: &Terrain) -> Result<Self> {
+        if let Some(flight) = flight {
+            return Ok(Self::Flight(flight));
+        }
+        let scale = args.view.vertical_scale;
+        if let Some(camera) = camera(&args.camera, scale, terrain)? {
+            return Ok(Self::Still(camera));
+        }
+        let heights = height_range_m(terrain)?.map(|h| (f64::from(h) + terrain.grid().base_m) * scale);
+        let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
+        check_heights(terrain, low, high)?;
+        if args.flight.is_some() {
+            let orbit = Flight::orbit(terrain.grid(), low, high);
+            return Ok(Self::Flight(orbit.scaled_down(scale)?));
+        }
+        let aspect = f64::from(args.view.size[0]) / f64::from(args.view.size[1]);
+        Ok(Self::Still(
+            overview(terrain.grid(), low, high, aspect).scaled_down(scale),
+        ))
+    }
+
     /// The views of the frames that are asked for.
     pub(super) fn views(&self, args: &RenderArgs) -> Result<Vec<View>> {
         let view = |camera| View::new(camera, args.view.size);
@@ -89,4 +116,16 @@ pub(super) fn camera(args: &CameraArgs, vertical_scale: f64, terrain: &Terrain) 
         roll_deg: args.roll.unwrap_or(0.0),
         fov_deg: args.fov.unwrap_or(FOV_DEG),
     }))
+}
+
+/// Refuses to look for a place from which heights beyond any camera's would be seen: most often they stand for no data.
+fn check_heights(terrain: &Terrain, low: f64, high: f64) -> Result<()> {
+    let most = if -low > high { low } else { high };
+    if most.abs() <= MAX_EYE_M / 8.0 {
+        return Ok(());
+    }
+    let what = format!("has heights of {most:.1e} m as drawn, too far up or down for a view of the whole");
+    Err(Error::new(ErrorKind::Limit, terrain.name(), what).advice(
+        "if they stand for no data, name their value with --nodata; else place the camera with --eye",
+    ))
 }

@@ -10,6 +10,7 @@ mod resident;
 mod shader;
 mod sky;
 mod staging;
+mod targets;
 mod textures;
 
 #[cfg(feature = "window")]
@@ -21,4 +22,5 @@ pub use renderer::{ClipmapRenderer, DrawReport};
 pub use resident::UploadReport;
 pub use shader::{Composed, Parts, ShaderError, compose, entry_files};
 pub use sky::SkyRenderer;
+pub use targets::Targets;
 pub use textures::ViewTextures;

@@ -1,6 +1,9 @@
 //! Fills what is not known outward from what is, so that no sentinel is ever in a light texture.
 
+use std::ops::Range;
+
 use crate::grid::Size;
+use crate::work::{Work, each_chunk, split_columns};
 
 /// Waves that go outward: beyond them nothing is looked at, and what lies within as many rows and columns decides what
 /// a sample becomes. What is drawn beside a void asks for two samples of light.
@@ -48,6 +51,48 @@ pub fn fill_voids(values: &mut [f32], size: Size) {
     values.iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = 1.0);
 }
 
+/// Columns that [`fill_rows`] fills at once.
+const STRIPE: usize = 1024;
+
+/// [`fill_voids`] of rows `rows` of a grid of `size` whose values are `value`, into `out`, in stripes of columns: no value
+/// depends on what lies beyond [`WAVES`] rows or columns, so that many beside the rows must be there, where there are any.
+pub(super) fn fill_rows(
+    size: Size,
+    value: impl Fn(usize) -> f32 + Sync,
+    rows: Range<i64>,
+    out: &mut [f32],
+    work: &dyn Work,
+) {
+    let Size { width, height } = size;
+    let around = (rows.start - WAVES).max(0)..(rows.end + WAVES).min(height);
+    let at = |x: i64, z: i64| (z * width + x) as usize;
+    let mut stripes = split_columns(out, width as usize, STRIPE);
+    each_chunk(work, &mut stripes, 1, |stripe, out| {
+        let x0 = (stripe * STRIPE) as i64;
+        let columns = x0..(x0 + STRIPE as i64).min(width);
+        let mut void = false;
+        for (out, z) in out[0].iter_mut().zip(rows.clone()) {
+            for (out, x) in out.iter_mut().zip(columns.clone()) {
+                *out = value(at(x, z));
+                void |= out.is_nan();
+            }
+        }
+        if !void {
+            return;
+        }
+        let beside = (columns.start - WAVES).max(0)..(columns.end + WAVES).min(width);
+        let cells = around.clone().flat_map(|z| beside.clone().map(move |x| at(x, z)));
+        let mut values: Vec<f32> = cells.map(&value).collect();
+        let wide = beside.end - beside.start;
+        let height = around.end - around.start;
+        fill_voids(&mut values, Size { width: wide, height });
+        for (out, z) in out[0].iter_mut().zip(rows.clone()) {
+            let from = ((z - around.start) * wide + columns.start - beside.start) as usize;
+            out.copy_from_slice(&values[from..][..out.len()]);
+        }
+    });
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,7 +126,7 @@ mod tests {
         };
         for (seed, share) in [(1, 0.5), (2, 0.95), (3, 0.995)] {
             let before = Random::new(seed).heights(size.samples(), 0.0, 1.0, share);
-            let filled = |rows: std::ops::Range<i64>| {
+            let filled = |rows: Range<i64>| {
                 let mut part = before[(rows.start * 29) as usize..(rows.end * 29) as usize].to_vec();
                 let height = rows.end - rows.start;
                 fill_voids(&mut part, Size { height, ..size });
@@ -93,6 +138,25 @@ mod tests {
             assert_eq!(whole[40 * 29..50 * 29], with(WAVES), "seed {seed}");
             // A control, where voids are so many that the last wave goes out.
             assert!(seed < 3 || whole[40 * 29..50 * 29] != with(WAVES / 2));
+        }
+    }
+
+    #[test]
+    fn stripes_of_columns_are_filled_as_the_whole_is() {
+        let size = Size {
+            width: 2 * STRIPE as i64 + 5,
+            height: 60,
+        };
+        for (seed, share) in [(1, 0.0), (2, 0.7), (3, 0.99), (4, 0.9995)] {
+            let before = Random::new(seed).heights(size.samples(), 0.0, 1.0, share);
+            let mut whole = before.clone();
+            fill_voids(&mut whole, size);
+            for rows in [0..60, 0..9, 20..33, 50..60] {
+                let wanted = (rows.start * size.width) as usize..(rows.end * size.width) as usize;
+                let mut out = vec![0.0; wanted.len()];
+                fill_rows(size, |at| before[at], rows, &mut out, &crate::work::Serial);
+                assert_eq!(out, whole[wanted], "seed {seed}");
+            }
         }
     }
 

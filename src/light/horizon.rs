@@ -11,7 +11,7 @@ use super::{check, misuse};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Rect};
 use crate::progress::Progress;
-use crate::work::{Work, each_chunk};
+use crate::work::{Work, each_chunk, split_columns};
 
 #[cfg(test)]
 mod tests;
@@ -74,14 +74,14 @@ pub fn horizon_tangents_on(
 
 /// One value a sample of all of `grid`, of which `make` gives so many rows as blocks are high at once; progress advances
 /// by rows. `subject` is what is cancelled.
-pub(super) fn all_rows(
+pub(super) fn all_rows<T: Copy + Default>(
     grid: &Grid,
     subject: &str,
     progress: &dyn Progress,
-    mut make: impl FnMut(Range<i64>, &mut [f32]) -> Result<()>,
-) -> Result<Vec<f32>> {
+    mut make: impl FnMut(Range<i64>, &mut [T]) -> Result<()>,
+) -> Result<Vec<T>> {
     let width = grid.size.width as usize;
-    let mut values = vec![0.0; grid.size.samples() as usize];
+    let mut values = vec![T::default(); grid.size.samples() as usize];
     for (rows, z0) in values.chunks_mut(BLOCK[1] * width).zip((0..).step_by(BLOCK[1])) {
         if progress.cancelled() {
             return Err(Error::cancelled(subject));
@@ -94,35 +94,34 @@ pub(super) fn all_rows(
 }
 
 /// Has `task` make the values of every block of `rows`, at most as many as blocks are high and beginning with one. It is
-/// given zeros in rows of [`BLOCK`]`[0]`, of which those within the block are put into `out`, row by row.
-pub(super) fn each_block(
+/// given defaults in rows of [`BLOCK`]`[0]`, of which those within the block are put into `out`, row by row.
+pub(super) fn each_block<T: Copy + Default + Send>(
     relief: &Relief<'_>,
     rows: Range<i64>,
-    out: &mut [f32],
+    out: &mut [T],
     work: &dyn Work,
-    task: impl Fn(Rect, &mut Scratch, &mut [f32]) -> Result<()> + Sync,
+    task: impl Fn(Rect, &mut Scratch, &mut [T]) -> Result<()> + Sync,
 ) -> Result<()> {
     debug_assert!(rows.start % BLOCK[1] as i64 == 0 && rows.end - rows.start <= BLOCK[1] as i64);
     let width = relief.grid().size.width;
     let area = BLOCK[0] * (rows.end - rows.start) as usize;
-    let mut blocks = vec![0.0; (width as usize).div_ceil(BLOCK[0]) * area];
+    let mut blocks = split_columns(out, width as usize, BLOCK[0]);
     let failed = Mutex::new(None);
-    each_chunk(work, &mut blocks, area, |x, values| {
+    each_chunk(work, &mut blocks, 1, |x, out| {
         let x0 = (x * BLOCK[0]) as i64;
         let block = Rect::new(x0, rows.start, (x0 + BLOCK[0] as i64).min(width), rows.end);
+        let mut values = vec![T::default(); area];
         let mut scratch = relief.scratch();
-        if let Err(error) = task(block, &mut scratch, values) {
+        if let Err(error) = task(block, &mut scratch, &mut values) {
             *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
         }
         relief.give_back(scratch);
-    });
-    if let Some(error) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        return Err(error);
-    }
-    for (z, row) in out.chunks_mut(width as usize).enumerate() {
-        for (block, part) in blocks.chunks(area).zip(row.chunks_mut(BLOCK[0])) {
-            part.copy_from_slice(&block[z * BLOCK[0]..][..part.len()]);
+        for (row, values) in out[0].iter_mut().zip(values.chunks(BLOCK[0])) {
+            row.copy_from_slice(&values[..row.len()]);
         }
-    }
-    Ok(())
+    });
+    failed
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner)
+        .map_or(Ok(()), Err)
 }

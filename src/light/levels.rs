@@ -9,7 +9,7 @@ use std::ops::Range;
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 
-use super::fill::{WAVES, fill_voids};
+use super::fill::{WAVES, fill_rows};
 use crate::grid::{Grid, Size};
 use crate::pyramid::{Filter, Halving};
 use crate::work::{Work, each_chunk};
@@ -66,12 +66,25 @@ impl LightLevels {
 
     /// Rows `rows` of `level`, row by row, the sun's share and the sky's (none where that is whole); they are known as
     /// soon as [`LIGHT_ROWS_BESIDE`] more are, or all. Earlier ones are forgotten but for those beside them.
-    pub fn give(&mut self, level: u32, rows: Range<i64>) -> [Vec<f16>; 2] {
+    pub fn give(&mut self, level: u32, rows: Range<i64>, work: &dyn Work) -> [Vec<f16>; 2] {
         let sky = self
             .sky
             .as_mut()
-            .map(|levels| levels[level as usize].give(rows.clone()));
-        [self.sun[level as usize].give(rows), sky.unwrap_or_default()]
+            .map(|levels| levels[level as usize].give(rows.clone(), work));
+        [self.sun[level as usize].give(rows, work), sky.unwrap_or_default()]
+    }
+
+    /// The rows of `level`, from the north, that can be given.
+    pub fn known(&self, level: u32) -> i64 {
+        let Level {
+            size, first, rows, ..
+        } = &self.sun[level as usize];
+        let put = first + rows.len() as i64 / size.width;
+        if put == size.height {
+            put
+        } else {
+            put - LIGHT_ROWS_BESIDE
+        }
     }
 }
 
@@ -102,26 +115,21 @@ impl Level {
         });
     }
 
-    fn give(&mut self, rows: Range<i64>) -> Vec<f16> {
-        let Size { width, height } = self.size;
-        let held = self.first..self.first + self.rows.len() as i64 / width;
-        let around = (rows.start - WAVES).max(0)..(rows.end + WAVES).min(height);
-        debug_assert!(
-            held.start <= around.start && around.end <= held.end,
-            "{held:?}, {around:?}"
-        );
-        let at = |row: i64| ((row - held.start) * width) as usize;
-        let wanted = at(rows.start)..at(rows.end);
-        let mut given = self.rows[wanted.clone()].to_vec();
+    fn give(&mut self, rows: Range<i64>, work: &dyn Work) -> Vec<f16> {
+        let Size { width, .. } = self.size;
+        let held = Size {
+            width,
+            height: self.rows.len() as i64 / width,
+        };
+        let at = |row: i64| ((row - self.first) * width) as usize;
+        let mut given = self.rows[at(rows.start)..at(rows.end)].to_vec();
         if given.iter().any(|s| s.is_nan()) {
-            let mut values = vec![0.0; at(around.end) - at(around.start)];
-            self.rows[at(around.start)..at(around.end)].convert_to_f32_slice(&mut values);
-            let height = around.end - around.start;
-            fill_voids(&mut values, Size { width, height });
-            let from = wanted.start - at(around.start);
-            given.convert_from_f32_slice(&values[from..from + wanted.len()]);
+            let mut values = vec![0.0; given.len()];
+            let wanted = rows.start - self.first..rows.end - self.first;
+            fill_rows(held, |at| self.rows[at].to_f32(), wanted, &mut values, work);
+            given.convert_from_f32_slice(&values);
         }
-        let passed = (rows.end - WAVES).max(held.start);
+        let passed = (rows.end - WAVES).max(self.first);
         self.rows.drain(..at(passed));
         self.first = passed;
         given
@@ -194,7 +202,7 @@ mod tests {
                         if *given == size.height || known < until {
                             continue;
                         }
-                        let [sun, sky] = levels.give(l as u32, *given..until);
+                        let [sun, sky] = levels.give(l as u32, *given..until, &Serial);
                         let want = &want[l][(*given * size.width) as usize..(until * size.width) as usize];
                         assert!(
                             sun.iter().eq(want.iter().map(|s| &s.sun)),
@@ -214,7 +222,7 @@ mod tests {
                 // What is left of each, now that all is known.
                 for (l, given) in given.into_iter().enumerate() {
                     let size = grid.level(l as u32);
-                    let [sun, _] = levels.give(l as u32, given..size.height);
+                    let [sun, _] = levels.give(l as u32, given..size.height, &Serial);
                     let want = &want[l][(given * size.width) as usize..];
                     assert!(
                         sun.iter().eq(want.iter().map(|s| &s.sun)),

@@ -1,6 +1,6 @@
 //! Light on the terrain: the sun's share and the sky's share of every sample, traced over the DEM's surface.
 //!
-//! `rays`, `crests` and `relief` find how high the terrain stands in a direction, `sun` and `sky` make light of it, [`light_levels`]
+//! `rays`, `crests` and `relief` find how high the terrain stands in a direction, `sun`, `sky` and `day` make light of it, [`light_levels`]
 //! and, row by row, [`LightLevels`] filter it into levels like the heights, and `fill` spreads each under its voids. All of it is traced
 //! over `S0`, level 0; no data, and what lies beyond the DEM, neither casts a shadow nor blocks the sky.
 //!
@@ -32,8 +32,11 @@ mod sun_at;
 
 pub use crests::{CREST, Crests};
 pub(crate) use day::disc_coefficients;
+#[cfg(test)]
+pub(crate) use day::plain as plain_day;
 pub use day::{
-    DAY_POSITIONS, Day, DayTrace, SunTime, day_levels, disc, disc_integral, sun_of_day, trace_day,
+    DAY_POSITIONS, Day, DayLevels, Daylight, LitTimes, SunTime, day_levels, disc, disc_integral, sun_of_day,
+    trace_day,
 };
 pub use earth::{DEFAULT_REFRACTION, Earth, middle};
 pub use fill::fill_voids;

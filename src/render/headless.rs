@@ -10,7 +10,7 @@ use crate::camera::{View, check_picture};
 use crate::clipmap::{Certificate, Clipmap, ClipmapOptions, UpdateReport, certify};
 use crate::error::{Error, ErrorKind, Result};
 use crate::gpu::{
-    ClipmapRenderer, DrawReport, Gpu, RendererOptions, SkyRenderer, UploadReport, ViewTextures, read,
+    ClipmapRenderer, DrawReport, Gpu, RendererOptions, SkyRenderer, Targets, UploadReport, ViewTextures, read,
 };
 use crate::levels::Levels;
 use crate::light::{Day, Sun};
@@ -38,6 +38,21 @@ pub struct HeadlessOptions {
     pub sun: Sun,
     /// Clip size, levels, transition, vertical scale, culling.
     pub clipmap: ClipmapOptions,
+}
+
+impl Default for HeadlessOptions {
+    fn default() -> Self {
+        Self {
+            size_px: [1280, 720],
+            sample_count: 1,
+            view_mode: ViewMode::Shaded,
+            tint: true,
+            haze: true,
+            traced_light: true,
+            sun: Sun::default(),
+            clipmap: ClipmapOptions::default(),
+        }
+    }
 }
 
 /// A frame, and what making it took.
@@ -97,15 +112,6 @@ impl std::fmt::Debug for Headless {
 }
 
 #[derive(Debug)]
-struct Targets {
-    colour: wgpu::Texture,
-    multisampled: Option<wgpu::TextureView>,
-    colour_view: wgpu::TextureView,
-    depth: wgpu::Texture,
-    depth_view: wgpu::TextureView,
-}
-
-#[derive(Debug)]
 struct Timer {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
@@ -126,7 +132,7 @@ impl Headless {
         let textures = renderer.textures(&gpu.device, &clipmap, options.sun)?;
         Ok(Self {
             sky: SkyRenderer::new(&gpu.device, &renderer_options)?,
-            targets: Targets::new(&gpu.device, options, &renderer_options),
+            targets: Targets::new(&gpu, options.size_px, &renderer_options),
             timer: gpu.has_timestamps().then(|| Timer::new(&gpu)),
             certifies: false,
             // The errors that this view shows are measured.
@@ -185,7 +191,7 @@ impl Headless {
         self.gpu.queue.submit([encoder.finish()]);
         self.wait()?;
         let drawn = Instant::now();
-        let mut rgba8 = self.gpu.read_texture(&self.targets.colour, 0)?;
+        let mut rgba8 = self.gpu.read_texture(self.targets.colour(), 0)?;
         let gpu_ms = self.timer.as_ref().map(|t| t.read_ms(&self.gpu)).transpose()?;
         let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
         let frame_ms = ms(start, Instant::now());
@@ -285,7 +291,7 @@ impl Headless {
         let Some(pass) = &self.measuring else {
             return Ok(None);
         };
-        let depths = pass.depths(&self.gpu, &self.clipmap, &self.textures, &self.targets.depth)?;
+        let depths = pass.depths(&self.gpu, &self.clipmap, &self.textures, self.targets.depth())?;
         let truth = self.truth.as_deref().unwrap_or(levels);
         let errors = pass.errors(truth, &self.clipmap, view, &depths)?;
         if self.options.view_mode == ViewMode::Error {
@@ -301,37 +307,12 @@ impl Headless {
     }
 
     fn record(&self, encoder: &mut wgpu::CommandEncoder) -> Result<DrawReport> {
-        let targets = &self.targets;
-        let (view, resolve_target) = match &targets.multisampled {
-            Some(view) => (view, Some(&targets.colour_view)),
-            None => (&targets.colour_view, None),
-        };
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("clipscape terrain and sky"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view,
-                depth_slice: None,
-                resolve_target,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &targets.depth_view,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(self.renderer.options().clear_depth()),
-                    store: wgpu::StoreOp::Store,
-                }),
-                stencil_ops: None,
-            }),
-            timestamp_writes: self.timer.as_ref().map(|timer| wgpu::RenderPassTimestampWrites {
-                query_set: &timer.queries,
-                beginning_of_pass_write_index: Some(0),
-                end_of_pass_write_index: Some(1),
-            }),
-            ..Default::default()
+        let timestamp_writes = self.timer.as_ref().map(|timer| wgpu::RenderPassTimestampWrites {
+            query_set: &timer.queries,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: Some(1),
         });
+        let mut pass = self.targets.pass(encoder, timestamp_writes);
         let report = self.renderer.draw(&mut pass, &self.clipmap, &self.textures)?;
         if matches!(self.options.view_mode, ViewMode::Shaded | ViewMode::Wire) {
             self.sky.draw(&mut pass, &self.textures)?;
@@ -369,7 +350,7 @@ impl Headless {
             return Err(Error::new(ErrorKind::Misuse, "multisampling", what)
                 .advice("draw with 1 sample to read depth"));
         }
-        let bytes = self.gpu.read_texture(&self.targets.depth, 0)?;
+        let bytes = self.gpu.read_texture(self.targets.depth(), 0)?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
@@ -415,52 +396,6 @@ fn renderer_options(options: &HeadlessOptions, clipmap: &Clipmap) -> RendererOpt
         tint: options.tint,
         haze: options.haze,
         ..Default::default()
-    }
-}
-
-impl Targets {
-    fn new(device: &wgpu::Device, options: &HeadlessOptions, renderer: &RendererOptions) -> Self {
-        let texture = |label, format, sample_count, usage| {
-            device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d {
-                    width: options.size_px[0],
-                    height: options.size_px[1],
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-                view_formats: &[],
-            })
-        };
-        let readable = wgpu::TextureUsages::COPY_SRC;
-        let samples = options.sample_count;
-        let colour = texture("clipscape colour", COLOUR_FORMAT, 1, readable);
-        let depth_usage = if samples == 1 {
-            readable
-        } else {
-            wgpu::TextureUsages::empty()
-        };
-        let depth = texture("clipscape depth", renderer.depth_format, samples, depth_usage);
-        let multisampled = (samples > 1).then(|| {
-            texture(
-                "clipscape multisampled colour",
-                COLOUR_FORMAT,
-                samples,
-                wgpu::TextureUsages::empty(),
-            )
-            .create_view(&Default::default())
-        });
-        Self {
-            colour_view: colour.create_view(&Default::default()),
-            depth_view: depth.create_view(&Default::default()),
-            colour,
-            multisampled,
-            depth,
-        }
     }
 }
 

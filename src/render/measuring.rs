@@ -6,7 +6,7 @@ use crate::build::Threads;
 use crate::camera::View;
 use crate::clipmap::{Clipmap, Drawn};
 use crate::error::Result;
-use crate::gpu::{ClipmapRenderer, Gpu, RendererOptions, ViewTextures};
+use crate::gpu::{ClipmapRenderer, Gpu, RendererOptions, Targets, ViewTextures};
 use crate::levels::Levels;
 use crate::query::{Tiles, Truth};
 use crate::shade::ViewMode;
@@ -41,8 +41,7 @@ impl std::fmt::Debug for MeasuringPass {
 #[derive(Debug)]
 struct SinglePass {
     renderer: ClipmapRenderer,
-    colour: wgpu::Texture,
-    depth: wgpu::Texture,
+    targets: Targets,
 }
 
 impl MeasuringPass {
@@ -76,7 +75,7 @@ impl MeasuringPass {
             None => depth,
             Some(single) => {
                 single.draw(gpu, clipmap, textures)?;
-                &single.depth
+                single.targets.depth()
             }
         };
         Ok(bytemuck::pod_collect_to_vec(&gpu.read_texture(depth, 0)?))
@@ -118,8 +117,7 @@ impl SinglePass {
         };
         Ok(Self {
             renderer: ClipmapRenderer::new(&gpu.device, &options)?,
-            colour: gpu.target("clipscape measured colour", size_px, COLOUR_FORMAT),
-            depth: gpu.target("clipscape measured depth", size_px, options.depth_format),
+            targets: Targets::new(gpu, size_px, &options),
         })
     }
 
@@ -129,27 +127,7 @@ impl SinglePass {
             .create_command_encoder(&wgpu::CommandEncoderDescriptor {
                 label: Some("clipscape measured frame"),
             });
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("clipscape measured terrain"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.colour.create_view(&Default::default()),
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Discard,
-                },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.depth.create_view(&Default::default()),
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Store,
-                }),
-                stencil_ops: None,
-            }),
-            ..Default::default()
-        });
+        let mut pass = self.targets.pass(&mut encoder, None);
         self.renderer.draw(&mut pass, clipmap, textures)?;
         drop(pass);
         gpu.queue.submit([encoder.finish()]);

@@ -9,12 +9,11 @@
 use std::collections::HashMap;
 
 use super::flat::{Flat, Layout};
-use super::held::HEIGHTS_ASSUMED;
 use super::open::Input;
 use super::sample::Coding;
-use super::{Description, Georeference, Registration, SampleType, unnamed};
+use super::unnamed::{self, Located};
+use super::{Georeference, Registration, SampleType};
 use crate::error::{Error, ErrorKind, Result};
-use crate::grid::Grid;
 
 /// Whether `text` is such a header.
 pub(super) fn is_header(text: &str) -> bool {
@@ -69,27 +68,13 @@ pub(super) fn open(input: &Input, text: &str) -> Result<Flat> {
     let size = layout.check(name, file_bytes)?;
 
     let pixel = header.pixel(name)?;
-    let located = match pixel {
+    let mut located = match pixel {
         Some(pixel) => unnamed::locate(input, header.place(name, height, pixel)?, pixel, size)?,
-        None => unnamed::Located {
-            place: None,
-            spacing_m: [1.0, 1.0],
-            assumed: vec!["The file does not say where it lies: the spacing is taken as 1 m.".into()],
-        },
+        None => Located::nowhere(),
     };
-    assumed.extend(located.assumed);
-    assumed.push(HEIGHTS_ASSUMED.into());
-    let description = Description {
-        grid: Grid::new(size.width, size.height, located.spacing_m),
-        format: "ESRI BIL".into(),
-        sample_type: sample.name().into(),
-        step_m: sample.integer().then_some(1.0),
-        place: located.place,
-        vertical_unit: "unknown".into(),
-        assumed,
-        name: name.into(),
-    };
-    Flat::new(description, input.bytes.clone(), layout)
+    assumed.append(&mut located.assumed);
+    located.assumed = assumed;
+    Flat::located(input, "ESRI BIL", located, layout, size)
 }
 
 /// The words of a header, in small letters, with their values.

@@ -7,13 +7,11 @@
 use std::collections::HashMap;
 
 use super::flat::{Flat, Layout};
-use super::held::HEIGHTS_ASSUMED;
 use super::open::Input;
 use super::sample::Coding;
-use super::unnamed::{self, System};
-use super::{Description, Georeference, Registration, SampleType};
+use super::unnamed::{self, Located, System};
+use super::{Georeference, Registration, SampleType};
 use crate::error::{Error, ErrorKind, Result};
-use crate::grid::Grid;
 
 /// Whether `text` is such a header.
 pub(super) fn is_header(text: &str) -> bool {
@@ -64,11 +62,7 @@ pub(super) fn open(input: &Input, text: &str) -> Result<Flat> {
     let layout = header.layout([width, height, bands], band, coding)?;
     let size = layout.check(name, input.bytes.size_bytes())?;
 
-    let mut located = unnamed::Located {
-        place: None,
-        spacing_m: [1.0, 1.0],
-        assumed: vec!["The file does not say where it lies: the spacing is taken as 1 m.".into()],
-    };
+    let mut located = Located::nowhere();
     if let Some(map) = header.map()? {
         let system = header
             .field("coordinate system string")
@@ -76,19 +70,7 @@ pub(super) fn open(input: &Input, text: &str) -> Result<Flat> {
             .or(map.system);
         located = unnamed::locate_in(name, system, Some(map.place), map.pixel, size)?;
     }
-    let mut assumed = located.assumed;
-    assumed.push(HEIGHTS_ASSUMED.into());
-    let description = Description {
-        grid: Grid::new(size.width, size.height, located.spacing_m),
-        format: "ENVI".into(),
-        sample_type: sample.name().into(),
-        step_m: sample.integer().then_some(1.0),
-        place: located.place,
-        vertical_unit: "unknown".into(),
-        assumed,
-        name: name.into(),
-    };
-    Flat::new(description, input.bytes.clone(), layout)
+    Flat::located(input, "ENVI", located, layout, size)
 }
 
 /// The fields of a header; names in small letters, values without braces.

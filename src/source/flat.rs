@@ -3,11 +3,13 @@
 
 use std::sync::Arc;
 
-use super::held::check_claim;
+use super::held::{HEIGHTS_ASSUMED, check_claim};
+use super::open::Input;
 use super::sample::Coding;
+use super::unnamed::Located;
 use super::{Description, HeightSource, ReadAt};
 use crate::error::{Error, ErrorKind, Result};
-use crate::grid::{Rect, Size};
+use crate::grid::{Grid, Rect, Size};
 use crate::progress::{Progress, Silent};
 
 /// Bytes read at once while a whole file is looked through.
@@ -73,6 +75,32 @@ pub(super) struct Flat {
 }
 
 impl Flat {
+    /// The DEM of a file that leaves the unit of its heights open, of `size` samples.
+    ///
+    /// # Errors
+    /// As [`Flat::new`].
+    pub(super) fn located(
+        input: &Input,
+        format: &str,
+        mut located: Located,
+        layout: Layout,
+        size: Size,
+    ) -> Result<Self> {
+        located.assumed.push(HEIGHTS_ASSUMED.into());
+        let sample = layout.coding.sample;
+        let description = Description {
+            grid: Grid::new(size.width, size.height, located.spacing_m),
+            format: format.into(),
+            sample_type: sample.name().into(),
+            step_m: sample.integer().then_some(1.0),
+            place: located.place,
+            vertical_unit: "unknown".into(),
+            assumed: located.assumed,
+            name: input.name.into(),
+        };
+        Self::new(description, input.bytes.clone(), layout)
+    }
+
     /// The DEM of `layout`, which has been checked against `bytes`. Where f32 does not hold every value, all are looked
     /// through for the base height.
     ///

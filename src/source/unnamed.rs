@@ -15,6 +15,17 @@ pub(super) struct Located {
     pub(super) assumed: Vec<String>,
 }
 
+impl Located {
+    /// For a file that says nothing of its place or its spacing.
+    pub(super) fn nowhere() -> Self {
+        Self {
+            place: None,
+            spacing_m: [1.0, 1.0],
+            assumed: vec!["The file does not say where it lies: the spacing is taken as 1 m.".into()],
+        }
+    }
+}
+
 /// Completes `place`, whose reference system is not known yet, of `size` samples; `pixel` are the steps in its units.
 ///
 /// # Errors

@@ -139,7 +139,7 @@ pub struct TileRow {
     pub y: i64,
     /// Rows of level 0 after which it is certainly known, at most the DEM's. Of heights those under the tiles and 64 of the
     /// level's own steps more, of light 80: a kernel of 32 lobes reaches 63 samples of the next finer level, as many of
-    /// the one below that, and so on, in all less than 63 steps of the level; and light is filled 16 samples into voids. Of bounds those under the patches and one
+    /// the one below that, and so on, in all less than 63 steps of the level; and light is filled 16 samples into voids, a day's as many of level 0. Of bounds those under the patches and one
     /// patch more: saturation asks the next finer level for one patch more than the children, and so on down.
     pub seen: i64,
 }
@@ -404,6 +404,10 @@ mod tests {
                 }
                 if kind == Kind::Bounds {
                     needs = ((needs + 1) * PATCH).min(height - 1);
+                }
+                if kind == Kind::Day {
+                    // Filled into voids on level 0.
+                    needs = (needs + crate::light::LIGHT_ROWS_BESIDE).min(height - 1);
                 }
                 if !matches!(kind, Kind::Check | Kind::CheckDay | Kind::CheckBounds) {
                     assert!(needs < row.seen, "{width} x {height}: {row:?} needs {needs}");

@@ -276,7 +276,7 @@ impl<'a> App<'a> {
             if wants.errors_changed {
                 overlay.set_errors(flying.errors());
             }
-            graphics.lay(&mut encoder, flying.scene.shown(graphics.encodes()), &view);
+            graphics.lay(&mut encoder, &flying.scene.shown(graphics.encodes()), &view);
             below_ground = flying.pilot.below_ground;
         } else {
             graphics.clear(&mut encoder, &view);

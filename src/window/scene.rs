@@ -7,7 +7,7 @@ use super::settings::Settings;
 use crate::camera::View;
 use crate::clipmap::{Clipmap, UpdateReport, Wait};
 use crate::error::{Error, Result};
-use crate::gpu::{ClipmapRenderer, DrawReport, Gpu, RendererOptions, SkyRenderer, ViewTextures};
+use crate::gpu::{ClipmapRenderer, DrawReport, Gpu, RendererOptions, SkyRenderer, Targets, ViewTextures};
 use crate::levels::Levels;
 use crate::light::Sun;
 use crate::render::COLOUR_FORMAT;
@@ -74,7 +74,7 @@ impl Scene {
         set_time_of_day(&mut textures, &terrain, &clipmap, settings)?;
         Ok(Self {
             sky: SkyRenderer::new(&gpu.device, &options)?,
-            targets: Targets::new(gpu, size_px, sample_count, &options),
+            targets: Targets::to_show(gpu, size_px, &options),
             renderers: vec![(Look::of(settings), renderer)],
             textures,
             clipmap,
@@ -121,9 +121,8 @@ impl Scene {
 
     /// Draws in pictures of another size from now on.
     pub(super) fn resize(&mut self, gpu: &Gpu, size_px: [u32; 2]) {
-        if size_px != self.targets.size_px {
-            let options = self.renderers[0].1.options();
-            self.targets = Targets::new(gpu, size_px, self.sample_count, options);
+        if size_px != self.targets.size_px() {
+            self.targets = Targets::to_show(gpu, size_px, self.renderers[0].1.options());
         }
     }
 
@@ -176,32 +175,7 @@ impl Scene {
     /// Those of the device.
     pub(super) fn record(&mut self, encoder: &mut wgpu::CommandEncoder) -> Result<DrawReport> {
         let renderer = &self.renderers[0].1;
-        let targets = &self.targets;
-        let (view, resolve_target) = match &targets.multisampled {
-            Some(view) => (view, Some(&targets.colour_view)),
-            None => (&targets.colour_view, None),
-        };
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("clipscape terrain and sky"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view,
-                depth_slice: None,
-                resolve_target,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &targets.depth_view,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(renderer.options().clear_depth()),
-                    store: wgpu::StoreOp::Discard,
-                }),
-                stencil_ops: None,
-            }),
-            ..Default::default()
-        });
+        let mut pass = self.targets.pass(encoder, None);
         let report = renderer.draw(&mut pass, &self.clipmap, &self.textures)?;
         if matches!(self.settings.view_mode, ViewMode::Shaded | ViewMode::Wire) {
             self.sky.draw(&mut pass, &self.textures)?;
@@ -210,12 +184,14 @@ impl Scene {
     }
 
     /// What was drawn, encoded as it is to be shown.
-    pub(super) fn shown(&self, encoded: bool) -> &wgpu::TextureView {
-        if encoded {
-            &self.targets.encoded_view
-        } else {
-            &self.targets.colour_view
-        }
+    pub(super) fn shown(&self, encoded: bool) -> wgpu::TextureView {
+        let bytes = COLOUR_FORMAT.remove_srgb_suffix();
+        self.targets.colour().create_view(&wgpu::TextureViewDescriptor {
+            label: Some("clipscape shown picture"),
+            format: encoded.then_some(bytes),
+            usage: Some(wgpu::TextureUsages::TEXTURE_BINDING),
+            ..Default::default()
+        })
     }
 
     /// The pixels that were drawn last, row by row from the top left: red, green, blue, alpha, sRGB; and their size.
@@ -223,8 +199,8 @@ impl Scene {
     /// # Errors
     /// Those of the device.
     pub(super) fn pixels(&self, gpu: &Gpu) -> Result<([u32; 2], Vec<u8>)> {
-        let rgba8 = gpu.read_texture(&self.targets.colour, 0)?;
-        Ok((self.targets.size_px, rgba8))
+        let rgba8 = gpu.read_texture(self.targets.colour(), 0)?;
+        Ok((self.targets.size_px(), rgba8))
     }
 
     pub(super) fn clipmap(&self) -> &Clipmap {
@@ -294,66 +270,6 @@ fn options(settings: &Settings, sample_count: u32, clipmap: &Clipmap) -> Rendere
         tint: settings.tint,
         haze: settings.haze,
         ..Default::default()
-    }
-}
-
-/// Textures of the window's size.
-struct Targets {
-    size_px: [u32; 2],
-    colour: wgpu::Texture,
-    colour_view: wgpu::TextureView,
-    /// The same as its bytes are, for a target that encodes nothing itself.
-    encoded_view: wgpu::TextureView,
-    multisampled: Option<wgpu::TextureView>,
-    depth_view: wgpu::TextureView,
-}
-
-impl Targets {
-    fn new(gpu: &Gpu, size_px: [u32; 2], sample_count: u32, options: &RendererOptions) -> Self {
-        use wgpu::TextureUsages as Usage;
-        let encoded = [COLOUR_FORMAT.remove_srgb_suffix()];
-        let texture = |label, format, sample_count, usage, view_formats| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d {
-                    width: size_px[0],
-                    height: size_px[1],
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: Usage::RENDER_ATTACHMENT | usage,
-                view_formats,
-            })
-        };
-        let readable = Usage::COPY_SRC | Usage::TEXTURE_BINDING;
-        let colour = texture("clipscape colour", COLOUR_FORMAT, 1, readable, &encoded);
-        let depth = texture(
-            "clipscape depth",
-            options.depth_format,
-            sample_count,
-            Usage::empty(),
-            &[],
-        );
-        let multisampled = (sample_count > 1).then(|| {
-            let label = "clipscape multisampled colour";
-            texture(label, COLOUR_FORMAT, sample_count, Usage::empty(), &[]).create_view(&Default::default())
-        });
-        Self {
-            size_px,
-            colour_view: colour.create_view(&Default::default()),
-            encoded_view: colour.create_view(&wgpu::TextureViewDescriptor {
-                label: Some("clipscape encoded colour"),
-                format: Some(encoded[0]),
-                usage: Some(Usage::TEXTURE_BINDING),
-                ..Default::default()
-            }),
-            multisampled,
-            depth_view: depth.create_view(&Default::default()),
-            colour,
-        }
     }
 }
 

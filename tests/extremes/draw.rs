@@ -6,23 +6,17 @@ use clipscape::gpu::{ClipmapRenderer, Gpu, RendererOptions, ViewTextures};
 use clipscape::levels::Levels;
 use clipscape::light::Sun;
 use clipscape::render::{Headless, HeadlessOptions};
-use clipscape::shade::ViewMode;
 use half::f16;
 
 /// Shaded, with all that shading does; clip size 64.
 pub(crate) fn options(size_px: [u32; 2]) -> HeadlessOptions {
     HeadlessOptions {
         size_px,
-        sample_count: 1,
-        view_mode: ViewMode::Shaded,
-        tint: true,
-        haze: true,
-        traced_light: true,
-        sun: Sun::default(),
         clipmap: ClipmapOptions {
             clip_size: 64,
             ..Default::default()
         },
+        ..Default::default()
     }
 }
 

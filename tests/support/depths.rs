@@ -1,7 +1,7 @@
 //! The depth image of one clipmap after another, by one set of pipelines.
 
 use clipscape::Clipmap;
-use clipscape::gpu::{ClipmapRenderer, Gpu, RendererOptions};
+use clipscape::gpu::{ClipmapRenderer, Gpu, RendererOptions, Targets};
 use clipscape::light::Sun;
 use clipscape::shade::ViewMode;
 
@@ -9,8 +9,7 @@ use clipscape::shade::ViewMode;
 pub struct Depths {
     pub gpu: Gpu,
     renderer: ClipmapRenderer,
-    colour: wgpu::Texture,
-    depth: wgpu::Texture,
+    targets: Targets,
 }
 
 impl Depths {
@@ -22,8 +21,7 @@ impl Depths {
         };
         Self {
             renderer: ClipmapRenderer::new(&gpu.device, &options).unwrap(),
-            colour: gpu.target("clipscape test colour", size_px, options.colour_format),
-            depth: gpu.target("clipscape test depth", size_px, options.depth_format),
+            targets: Targets::new(&gpu, size_px, &options),
             gpu,
         }
     }
@@ -35,30 +33,10 @@ impl Depths {
         self.renderer
             .upload(&mut encoder, clipmap, &mut textures)
             .unwrap();
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("clipscape test pass"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.colour.create_view(&Default::default()),
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.depth.create_view(&Default::default()),
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Store,
-                }),
-                stencil_ops: None,
-            }),
-            ..Default::default()
-        });
+        let mut pass = self.targets.pass(&mut encoder, None);
         self.renderer.draw(&mut pass, clipmap, &textures).unwrap();
         drop(pass);
         self.gpu.queue.submit([encoder.finish()]);
-        bytemuck::pod_collect_to_vec(&self.gpu.read_texture(&self.depth, 0).unwrap())
+        bytemuck::pod_collect_to_vec(&self.gpu.read_texture(self.targets.depth(), 0).unwrap())
     }
 }

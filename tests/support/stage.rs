@@ -1,11 +1,11 @@
-//! A caller's side of the library's face: targets of its own, and its own passes.
+//! A caller's side of the library's face: its own encoders, targets and submissions.
 #![allow(unreachable_pub, reason = "a module of test programs has no outside")]
 #![allow(dead_code, reason = "each test program uses its own part of this")]
 
 use clipscape::Clipmap;
 use clipscape::camera::View;
 use clipscape::clipmap::ClipmapOptions;
-use clipscape::gpu::{ClipmapRenderer, Gpu, RendererOptions, ViewTextures};
+use clipscape::gpu::{ClipmapRenderer, Gpu, RendererOptions, Targets, ViewTextures};
 use clipscape::levels::Levels;
 use clipscape::light::Sun;
 
@@ -20,13 +20,6 @@ pub struct Stage {
 pub struct Eye {
     pub clipmap: Clipmap,
     pub textures: ViewTextures,
-}
-
-/// A picture's textures.
-pub struct Target {
-    pub colour: wgpu::Texture,
-    multisampled: Option<wgpu::Texture>,
-    pub depth: wgpu::Texture,
 }
 
 impl Stage {
@@ -51,92 +44,32 @@ impl Stage {
         Eye { clipmap, textures }
     }
 
-    pub fn target(&self) -> Target {
-        let options = self.renderer.options();
-        let texture = |format, sample_count| {
-            self.gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: None,
-                size: wgpu::Extent3d {
-                    width: self.size_px[0],
-                    height: self.size_px[1],
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: if sample_count == 1 {
-                    wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC
-                } else {
-                    wgpu::TextureUsages::RENDER_ATTACHMENT
-                },
-                view_formats: &[],
-            })
-        };
-        let samples = options.sample_count;
-        Target {
-            colour: texture(options.colour_format, 1),
-            multisampled: (samples > 1).then(|| texture(options.colour_format, samples)),
-            depth: texture(options.depth_format, samples),
-        }
+    pub fn target(&self) -> Targets {
+        Targets::new(&self.gpu, self.size_px, self.renderer.options())
     }
 
     pub fn encoder(&self) -> wgpu::CommandEncoder {
         self.gpu.device.create_command_encoder(&Default::default())
     }
 
-    /// A pass over cleared targets, in which `draw` draws.
-    pub fn pass(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        target: &Target,
-        draw: impl FnOnce(&mut wgpu::RenderPass<'_>),
-    ) {
-        let view = |t: &wgpu::Texture| t.create_view(&Default::default());
-        let (colour, depth) = (view(&target.colour), view(&target.depth));
-        let multisampled = target.multisampled.as_ref().map(view);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: multisampled.as_ref().unwrap_or(&colour),
-                depth_slice: None,
-                resolve_target: multisampled.as_ref().map(|_| &colour),
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &depth,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(self.renderer.options().clear_depth()),
-                    store: wgpu::StoreOp::Store,
-                }),
-                stencil_ops: target
-                    .depth
-                    .format()
-                    .has_stencil_aspect()
-                    .then_some(wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(0),
-                        store: wgpu::StoreOp::Discard,
-                    }),
-            }),
-            ..Default::default()
-        });
-        draw(&mut pass);
-    }
-
     /// Records the upload and the drawing of what `eye` saw last.
-    pub fn record(&self, encoder: &mut wgpu::CommandEncoder, eye: &mut Eye, target: &Target) {
+    pub fn record(&self, encoder: &mut wgpu::CommandEncoder, eye: &mut Eye, target: &Targets) {
         self.renderer
             .upload(encoder, &eye.clipmap, &mut eye.textures)
             .unwrap();
-        self.pass(encoder, target, |pass| {
-            self.renderer.draw(pass, &eye.clipmap, &eye.textures).unwrap();
-        });
+        self.draw(encoder, eye, target);
+    }
+
+    /// Records the drawing of what was uploaded.
+    pub fn draw(&self, encoder: &mut wgpu::CommandEncoder, eye: &Eye, target: &Targets) {
+        let mut pass = target.pass(encoder, None);
+        self.renderer
+            .draw(&mut pass, &eye.clipmap, &eye.textures)
+            .unwrap();
     }
 
     /// The picture of what `view` sees, drawn in a submission of its own.
-    pub fn picture(&self, levels: &dyn Levels, eye: &mut Eye, view: &View) -> Target {
+    pub fn picture(&self, levels: &dyn Levels, eye: &mut Eye, view: &View) -> Targets {
         eye.clipmap.update(levels, view, 0.0).unwrap();
         let target = self.target();
         let mut encoder = self.encoder();
@@ -145,12 +78,12 @@ impl Stage {
         target
     }
 
-    pub fn colours(&self, target: &Target) -> Vec<u8> {
-        self.gpu.read_texture(&target.colour, 0).unwrap()
+    pub fn colours(&self, target: &Targets) -> Vec<u8> {
+        self.gpu.read_texture(target.colour(), 0).unwrap()
     }
 
     /// Depths of a target of 32-bit float.
-    pub fn depths(&self, target: &Target) -> Vec<f32> {
-        bytemuck::pod_collect_to_vec(&self.gpu.read_texture(&target.depth, 0).unwrap())
+    pub fn depths(&self, target: &Targets) -> Vec<f32> {
+        bytemuck::pod_collect_to_vec(&self.gpu.read_texture(target.depth(), 0).unwrap())
     }
 }

@@ -1,7 +1,14 @@
 //! Days over shapes whose shadows are known.
 
+use half::f16;
+
 use super::*;
+use crate::grid::Grid;
+use crate::levels::DaySample;
+use crate::light::{DISC_DEG, Earth};
 use crate::progress::Silent;
+use crate::pyramid::Filter;
+use crate::pyramid::random::Random;
 use crate::work::Serial;
 
 fn day(text: &str, latitude_deg: f64, longitude_deg: f64, positions: u32) -> Day {
@@ -124,7 +131,7 @@ impl Wall {
             .map(|(x, _)| if x == COLUMN { HEIGHT_M as f32 } else { 0.0 })
             .collect();
         let trace = trace_day(&heights, &grid, &Earth::default(), &day, &Serial, &Silent).unwrap();
-        let levels = day_levels(&grid, &heights, trace, &Filter::default(), &Serial, &Silent).unwrap();
+        let levels = day_levels(&grid, &trace, &Filter::default(), &Serial, &Silent).unwrap();
         let samples = levels[0][2 * WIDTH as usize..3 * WIDTH as usize].to_vec();
         (Self { day, samples }, heights, grid)
     }
@@ -230,7 +237,7 @@ fn ground_that_is_never_lit_stays_dark_and_a_day_without_end_stays_light() {
         .collect();
     let levels = |day: &Day| {
         let trace = trace_day(&heights, &grid, &Earth::default(), day, &Serial, &Silent).unwrap();
-        day_levels(&grid, &heights, trace, &Filter::default(), &Serial, &Silent).unwrap()
+        day_levels(&grid, &trace, &Filter::default(), &Serial, &Silent).unwrap()
     };
     let share = |s: &DaySample, time: f64| {
         let times = [s.first, s.first_soft, s.last, s.last_soft].map(f16::to_f32);
@@ -255,16 +262,15 @@ fn coarse_ground_is_lit_over_as_long_as_its_pieces_take() {
     // Columns in turn have first light at -0.5 and at 0.1: half of the ground is lit in between.
     let grid = Grid::new(256, 256, [1.0, 1.0]);
     let column = |x: i64, a: f32, b: f32| if x % 2 == 0 { a } else { b };
-    let of =
-        |a: f32, b: f32| -> Vec<f32> { grid.size.rect().cells().map(|(x, _)| column(x, a, b)).collect() };
-    let trace = DayTrace {
-        first: of(-0.5, 0.1),
-        first_soft: of(0.01, 0.01),
-        last: of(0.9, 0.9),
-        last_soft: of(0.01, 0.01),
+    let times = |(x, _)| LitTimes {
+        first: column(x, -0.5, 0.1),
+        first_soft: 0.01,
+        last: 0.9,
+        last_soft: 0.01,
+        slope_square: 0.0,
     };
-    let flat = vec![0.0; 256 * 256];
-    let levels = day_levels(&grid, &flat, trace, &Filter::default(), &Serial, &Silent).unwrap();
+    let trace: Vec<LitTimes> = grid.size.rect().cells().map(times).collect();
+    let levels = day_levels(&grid, &trace, &Filter::default(), &Serial, &Silent).unwrap();
     let sample = levels[1][64 * 129 + 64];
     assert!((sample.first.to_f32() + 0.2).abs() < 1e-3, "{sample:?}");
     // Two values 0.3 from their mean: a half circle of that deviation has twice the radius.
@@ -273,4 +279,97 @@ fn coarse_ground_is_lit_over_as_long_as_its_pieces_take() {
     let times = [sample.first, sample.first_soft, sample.last, sample.last_soft].map(f16::to_f32);
     let share = |time: f32| sun_of_day(times, 0.0, [0.0; 2], [0.0, 1.0, 0.0], time);
     assert!((share(-0.2) - 0.5).abs() < 0.01 && share(-0.9) == 0.0 && share(0.5) == 1.0);
+}
+
+/// Random ground of some relief, voids in so many of a hundred samples and west of a coast.
+fn ground(seed: u64, grid: &Grid, voids: f64, coast: i64) -> Vec<f32> {
+    let mut heights = Random::new(seed).heights(grid.size.samples(), 0.0, 40.0, voids);
+    for (h, (x, z)) in heights.iter_mut().zip(grid.size.rect().cells()) {
+        let hill = 300.0 * (x as f32 / 30.0).sin() * (z as f32 / 41.0).cos();
+        *h = if x < coast + z / 5 % 7 * coast.signum() {
+            f32::NAN
+        } else {
+            *h + hill
+        };
+    }
+    heights
+}
+
+/// All bits of times, which may be NaN.
+fn bits(times: &[LitTimes]) -> Vec<[u32; 5]> {
+    times
+        .iter()
+        .map(|times| times.fields().map(f32::to_bits))
+        .collect()
+}
+
+#[test]
+fn rows_in_pieces_give_the_bits_of_the_whole() {
+    let cases = [
+        (600, 300, 0.0, 0),
+        (300, 420, 0.3, 0),
+        (1100, 150, 0.01, 60),
+        (70, 300, 0.97, 0),
+        (1, 1, 0.0, 0),
+        (1, 300, 0.1, 0),
+        (5, 3, 1.0, 0),
+    ];
+    let day = day("2026-03-20T12:00Z", 42.5, 1.5, 5);
+    let earth = Earth {
+        radius_m: 7.3e6,
+        ..Earth::default()
+    };
+    let filter = Filter::default();
+    let threads = crate::build::Threads::new(2).unwrap();
+    for (seed, (width, height, voids, coast)) in (0..).zip(cases) {
+        let case = format!("{width} x {height}, voids {voids}, coast {coast}");
+        let grid = Grid::new(width, height, [30.0, 22.0]);
+        let heights = ground(seed, &grid, voids, coast);
+        let plain = plain::trace_day(&heights, &grid, &earth, &day).unwrap();
+        let traced = trace_day(&heights, &grid, &earth, &day, &threads, &Silent).unwrap();
+        assert!(bits(&traced) == bits(&plain), "{case}");
+        let want = plain::day_levels(&grid, &plain, &filter).unwrap();
+        assert!(
+            day_levels(&grid, &traced, &filter, &threads, &Silent).unwrap() == want,
+            "{case}"
+        );
+        // In pieces of rows of any number, of which some are forgotten.
+        let mut levels = DayLevels::new(&grid, &filter);
+        let mut random = Random::new(seed);
+        let mut forgotten = vec![0; want.len()];
+        let mut taken = 0;
+        while taken < height {
+            let until = (taken + 1 + random.below(70)).min(height);
+            levels.take(
+                &traced[(taken * width) as usize..(until * width) as usize],
+                &Serial,
+            );
+            taken = until;
+            for (l, from) in (0..).zip(&mut forgotten) {
+                let rows = *from..levels.known(l);
+                let size = grid.level(l);
+                let want =
+                    &want[l as usize][(rows.start * size.width) as usize..(rows.end * size.width) as usize];
+                let same = |(got, want): (&[f16; 5], &DaySample)| {
+                    *got == [want.first, want.first_soft, want.last, want.last_soft, want.slope]
+                };
+                assert!(
+                    levels.rows(l, rows.clone()).iter().zip(want).all(same),
+                    "{case}, level {l}, {rows:?}"
+                );
+                if taken == height {
+                    assert_eq!(rows.end, size.height, "{case}, level {l}");
+                }
+                *from = rows.start + random.below(rows.end - rows.start + 1);
+                levels.forget(l, *from);
+            }
+        }
+    }
+    // A control: ground that is a metre higher somewhere is lit otherwise.
+    let grid = Grid::new(300, 200, [30.0, 22.0]);
+    let mut heights = ground(1, &grid, 0.0, 0);
+    let before = plain::trace_day(&heights, &grid, &earth, &day).unwrap();
+    heights[100 * 300 + 150] += 1.0;
+    let after = trace_day(&heights, &grid, &earth, &day, &Serial, &Silent).unwrap();
+    assert!(bits(&before) != bits(&after));
 }

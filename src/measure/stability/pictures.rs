@@ -12,10 +12,8 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::grid::Grid;
 use crate::levels::Levels;
-use crate::light::Sun;
 use crate::progress::Silent;
 use crate::render::{Headless, HeadlessOptions};
-use crate::shade::ViewMode;
 use crate::stream::Terrain;
 
 const SIZE_PX: [u32; 2] = [96, 64];
@@ -31,17 +29,15 @@ const FIELDS: [Field; 2] = [(rough, [-400.0, 460.0]), (noise, [0.0, 9000.0])];
 pub(super) fn options(cull: bool, look: bool) -> HeadlessOptions {
     HeadlessOptions {
         size_px: SIZE_PX,
-        sample_count: 1,
-        view_mode: ViewMode::Shaded,
         tint: look,
         haze: look,
         traced_light: false,
-        sun: Sun::default(),
         clipmap: ClipmapOptions {
             clip_size: 64,
             cull,
             ..Default::default()
         },
+        ..Default::default()
     }
 }
 

@@ -3,7 +3,12 @@
 use super::super::{Band, HeightSource, OpenOptions};
 use super::*;
 
-fn read(name: &str, header: &str, bytes: Vec<u8>, options: &OpenOptions) -> Result<(Description, Vec<f32>)> {
+fn read(
+    name: &str,
+    header: &str,
+    bytes: Vec<u8>,
+    options: &OpenOptions,
+) -> Result<(crate::source::Description, Vec<f32>)> {
     let flat = open(&Input::bare(name, bytes, options), header)?;
     let mut out = vec![0.0; flat.description().grid.size.samples() as usize];
     flat.read(flat.description().grid.size.rect(), &mut out)?;

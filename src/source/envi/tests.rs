@@ -7,7 +7,11 @@ const HEADER: &str = "ENVI\ndescription = {\n a test}\nsamples = 2\nlines = 2\nb
                       data type = 2\ninterleave = bsq\nbyte order = 1\ndata ignore value = -7\n\
                       map info = {UTM, 1, 1, 440720, 3751320, 60, 30, 11, North,North America 1927}\n";
 
-fn read(header: &str, bytes: Vec<u8>, options: &OpenOptions) -> Result<(Description, Vec<f32>)> {
+fn read(
+    header: &str,
+    bytes: Vec<u8>,
+    options: &OpenOptions,
+) -> Result<(crate::source::Description, Vec<f32>)> {
     let flat = open(&Input::bare("a.dat", bytes, options), header)?;
     let mut out = vec![0.0; flat.description().grid.size.samples() as usize];
     flat.read(flat.description().grid.size.rect(), &mut out)?;

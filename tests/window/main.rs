@@ -12,233 +12,28 @@
     reason = "a test says why it is skipped, and what it drew by chance"
 )]
 
+mod pictures;
+mod screen;
+#[path = "../support/mod.rs"]
 mod support;
 
-use std::fs::{self, File};
-use std::io::{BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::fs;
+use std::io::Read;
+use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clipscape::Flight;
-use support::{Random, gpu, seed};
-
-/// How long anything may take here, on a machine that does other things too.
-const PATIENCE: Duration = Duration::from_secs(240);
-
-/// The golden frames' tolerance: mean difference of 255, and the share of pixels that may differ by more than `FAR`.
-const MEAN_LIMIT: f64 = 0.25;
-const FAR_SHARE_LIMIT: f64 = 0.005;
-const FAR: u8 = 4;
-
-/// A screen without a monitor; gone when dropped.
-struct Screen {
-    server: Child,
-    display: String,
-}
-
-impl Screen {
-    /// Starts one on a number that is free, or says why not.
-    fn start() -> Option<Self> {
-        let missing = |what: &str| {
-            let required = std::env::var_os("CLIPSCAPE_REQUIRE_WINDOW").is_some_and(|v| v == "1");
-            assert!(!required, "CLIPSCAPE_REQUIRE_WINDOW is set, but {what}");
-            eprintln!("skipped: {what}");
-            None
-        };
-        gpu()?;
-        if Command::new("xdotool").arg("version").output().is_err() {
-            return missing("there is no xdotool");
-        }
-        let server = Command::new("Xvfb")
-            .args([
-                "-displayfd",
-                "1",
-                "-screen",
-                "0",
-                "1024x768x24",
-                "-nolisten",
-                "tcp",
-            ])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn();
-        let Ok(mut server) = server else {
-            return missing("there is no Xvfb");
-        };
-        let mut number = String::new();
-        let mut out = BufReader::new(server.stdout.take().expect("it is piped"));
-        out.read_line(&mut number).expect("Xvfb says its number");
-        let display = format!(":{}", number.trim());
-        Some(Self { server, display })
-    }
-
-    /// Sends input.
-    fn send(&self, words: &[&str]) -> String {
-        let output = Command::new("xdotool")
-            .args(words)
-            .env("DISPLAY", &self.display)
-            .output()
-            .expect("xdotool starts");
-        String::from_utf8(output.stdout).expect("text")
-    }
-
-    fn key(&self, key: &str) {
-        self.send(&["key", key]);
-    }
-}
-
-impl Drop for Screen {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
-}
-
-/// The program with its window; ended when dropped.
-struct Window<'a> {
-    screen: &'a Screen,
-    program: Child,
-    lines: Receiver<String>,
-}
-
-impl<'a> Window<'a> {
-    /// Flies as a user would, and waits until there is a window that hears keys.
-    fn open(screen: &'a Screen, arguments: &[&str]) -> Self {
-        Self::open_scaled(screen, arguments, 1.0)
-    }
-
-    /// The same on a screen whose points are `scale` pixels wide.
-    fn open_scaled(screen: &'a Screen, arguments: &[&str], scale: f64) -> Self {
-        let mut program = Command::new(env!("CARGO_BIN_EXE_clipscape"))
-            .arg("fly")
-            .args(arguments)
-            .env("WINIT_X11_SCALE_FACTOR", scale.to_string())
-            .env("DISPLAY", &screen.display)
-            .env_remove("WAYLAND_DISPLAY")
-            .env_remove("WAYLAND_SOCKET")
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the program starts");
-        let err = BufReader::new(program.stderr.take().expect("it is piped"));
-        let (say, lines) = channel();
-        std::thread::spawn(move || {
-            err.lines()
-                .map_while(Result::ok)
-                .try_for_each(|line| say.send(line))
-        });
-        let window = Self {
-            screen,
-            program,
-            lines,
-        };
-        let start = Instant::now();
-        let id = loop {
-            let found = screen.send(&["search", "--onlyvisible", "--name", "^clipscape: "]);
-            if let Some(id) = found.lines().next() {
-                break id.to_string();
-            }
-            assert!(start.elapsed() < PATIENCE, "no window appears");
-            sleep(Duration::from_millis(100));
-        };
-        // Without a window manager nobody gives it the keyboard.
-        screen.send(&["windowfocus", "--sync", &id]);
-        window
-    }
-
-    /// Presses a key until a line says what it is to say: before the terrain is there, keys do nothing.
-    fn press_until(&self, key: &str, says: impl Fn(&str) -> bool) -> String {
-        let start = Instant::now();
-        while start.elapsed() < PATIENCE {
-            self.screen.key(key);
-            let until = Instant::now() + Duration::from_secs(3);
-            while let Ok(line) = self.lines.recv_timeout(until - Instant::now().min(until)) {
-                if says(&line) {
-                    return line;
-                }
-            }
-        }
-        panic!("{key} is without effect");
-    }
-
-    /// A picture of all that is to be seen, once it is.
-    fn picture(&self) -> PathBuf {
-        let line = self.press_until("p", |line| line.ends_with(".png is written"));
-        let path = line.strip_prefix("clipscape: ").expect("it is the program's");
-        PathBuf::from(path.strip_suffix(" is written").expect("it ends so"))
-    }
-
-    /// Its memory in bytes, as the system counts what is resident.
-    fn resident_bytes(&self) -> u64 {
-        let status = fs::read_to_string(format!("/proc/{}/status", self.program.id())).expect("it runs");
-        let line = status
-            .lines()
-            .find(|l| l.starts_with("VmRSS:"))
-            .expect("it has memory");
-        let kib = line.split_whitespace().nth(1).and_then(|n| n.parse::<u64>().ok());
-        1024 * kib.expect("a number")
-    }
-
-    /// Quits, and returns the exit status and what else was said.
-    fn quit(mut self) -> (Option<i32>, Vec<String>) {
-        self.screen.key("Escape");
-        let start = Instant::now();
-        let status = loop {
-            if let Some(status) = self.program.try_wait().expect("it is a child") {
-                break status;
-            }
-            assert!(start.elapsed() < PATIENCE, "it does not quit");
-            sleep(Duration::from_millis(50));
-        };
-        (status.code(), self.lines.try_iter().collect())
-    }
-}
-
-impl Drop for Window<'_> {
-    fn drop(&mut self) {
-        let _ = self.program.kill();
-        let _ = self.program.wait();
-    }
-}
-
-fn pixels(path: &Path) -> (u32, u32, Vec<u8>) {
-    let file = BufReader::new(File::open(path).expect("the picture is there"));
-    let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
-    let mut rgb = vec![0; reader.output_buffer_size().expect("it fits")];
-    let info = reader.next_frame(&mut rgb).expect("a picture");
-    rgb.truncate(info.buffer_size());
-    (info.width, info.height, rgb)
-}
-
-/// The mean difference, and the share of pixels that are far off.
-fn difference(a: &Path, b: &Path) -> (f64, f64) {
-    let ((w, h, a), (v, g, b)) = (pixels(a), pixels(b));
-    assert_eq!((w, h), (v, g));
-    let off: Vec<u8> = a.iter().zip(&b).map(|(a, b)| a.abs_diff(*b)).collect();
-    let mean = off.iter().map(|&d| f64::from(d)).sum::<f64>() / off.len() as f64;
-    let far = off.chunks(3).filter(|p| p.iter().any(|&d| d > FAR)).count();
-    (mean, far as f64 / f64::from(w * h))
-}
+use pictures::{FAR, FAR_SHARE_LIMIT, MEAN_LIMIT, difference, pixels};
+use screen::{Screen, Window};
+use support::{Random, seed};
 
 #[test]
 fn a_recorded_flight_is_replayed_to_the_picture_that_was_seen() {
     let Some(screen) = Screen::start() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
-    let window = Window::open(
-        &screen,
-        &[
-            "synth:1024:3",
-            "--size",
-            "800x500",
-            "--clip-size",
-            "128",
-            "--output-dir",
-            out,
-        ],
-    );
+    let arguments = ["--clip-size", "128"];
+    let window = Window::open(&screen, "synth:1024:3", "800x500", folder.path(), &arguments);
     let first = window.picture();
     assert_eq!(first, folder.path().join("synth-1024-3-001.png"));
 
@@ -302,17 +97,8 @@ fn a_recorded_flight_is_replayed_to_the_picture_that_was_seen() {
 fn on_a_screen_of_fine_pixels_pictures_are_as_large_as_asked_for_and_the_window_is_resized() {
     let Some(screen) = Screen::start() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
-    let arguments = [
-        "synth:1024:3",
-        "--size",
-        "800x500",
-        "--clip-size",
-        "64",
-        "--output-dir",
-        out,
-    ];
-    let window = Window::open_scaled(&screen, &arguments, 2.0);
+    let arguments = ["--clip-size", "64"];
+    let window = Window::open_scaled(&screen, 2.0, "synth:1024:3", "800x500", folder.path(), &arguments);
     let (width, height, _) = pixels(&window.picture());
     assert_eq!([width, height], [800, 500]);
     let id = screen.send(&["search", "--onlyvisible", "--name", "^clipscape: "]);
@@ -331,18 +117,8 @@ fn on_a_screen_of_fine_pixels_pictures_are_as_large_as_asked_for_and_the_window_
 fn a_lost_device_is_replaced_once_and_a_second_loss_ends_it() {
     let Some(screen) = Screen::start() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
-    let arguments = [
-        "synth:1024:3",
-        "--size",
-        "640x400",
-        "--clip-size",
-        "64",
-        "--loses-device",
-        "--output-dir",
-        out,
-    ];
-    let mut window = Window::open(&screen, &arguments);
+    let arguments = ["--clip-size", "64", "--loses-device"];
+    let mut window = Window::open(&screen, "synth:1024:3", "640x400", folder.path(), &arguments);
     let before = window.picture();
     let line = window.press_until("F12", |line| line.contains("was lost"));
     assert_eq!(line, "clipscape: The graphics device was lost, and replaced");
@@ -402,19 +178,8 @@ fn random_input_neither_ends_it_nor_fills_the_memory() {
     eprintln!("seed {seed}, {:.0} s", length.as_secs_f64());
     let mut random = Random(seed);
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
-    let mut window = Window::open(
-        &screen,
-        &[
-            "synth:4096:3",
-            "--size",
-            "800x500",
-            "--clip-size",
-            "64",
-            "--output-dir",
-            out,
-        ],
-    );
+    let arguments = ["--clip-size", "64"];
+    let mut window = Window::open(&screen, "synth:4096:3", "800x500", folder.path(), &arguments);
     window.picture();
     let start = Instant::now();
     let mut resident = Vec::new();
