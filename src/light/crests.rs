@@ -6,7 +6,10 @@ use crate::work::{Work, each_chunk};
 use super::relief::{LANES, greater, slide};
 
 /// Samples along a block's side.
-pub const CREST: usize = 64;
+pub const CREST: usize = 32;
+
+/// Along those that windows are made of.
+const COARSE: usize = 64;
 
 /// The greatest heights over blocks of [`CREST`] samples a side: 4 bytes for each.
 #[derive(Clone, Debug)]
@@ -39,8 +42,8 @@ impl Crests {
         crests
     }
 
-    /// The greatest heights over the blocks of `heights`, rows of `width` samples, row by row; minus infinity where all
-    /// is void.
+    /// The greatest heights over the blocks of `heights`, rows of `width` samples, row by row; minus infinity where
+    /// all is void.
     pub fn measure(heights: &[f32], width: usize) -> Vec<f32> {
         let mut most = Vec::new();
         let mut columns = vec![0f32; width];
@@ -76,16 +79,32 @@ impl Crests {
             .fold(f32::NEG_INFINITY, |most, &h| greater(most, h))
     }
 
-    /// The greatest over windows from each block on that hold a stretch of rays of `cells` cells either way, and a sample
-    /// on both sides of it, as [`LANES`] samples see it.
+    /// The greatest height of the blocks of `rect`; minus infinity where there are none.
+    pub(super) fn over(&self, rect: Rect) -> f32 {
+        let across = blocks(rect.x0, rect.x1, CREST, self.wide);
+        let rows = blocks(rect.z0, rect.z1, CREST, self.high);
+        rows.flat_map(|z| &self.highest[z * self.wide..][across.clone()])
+            .fold(f32::NEG_INFINITY, |most, &h| greater(most, h))
+    }
+
+    /// The greatest over windows from each coarse block on that hold a stretch of rays of `cells` cells either way,
+    /// and a sample on both sides of it, as [`LANES`] samples see it.
     pub(super) fn windows(&self, cells: i64) -> CrestWindows {
+        const EACH: usize = COARSE / CREST;
+        let (wide, high) = (self.wide.div_ceil(EACH), self.high.div_ceil(EACH));
+        let mut coarse = vec![f32::NEG_INFINITY; wide * high];
+        for (z, row) in self.highest.chunks(self.wide).enumerate() {
+            for (blocks, most) in row.chunks(EACH).zip(&mut coarse[z / EACH * wide..]) {
+                *most = blocks.iter().fold(*most, |most, &h| greater(most, h));
+            }
+        }
         // It begins anywhere in a block.
-        let count = |samples: usize| (samples + CREST - 1).div_ceil(CREST);
-        let across = slide(&self.highest, self.wide, false, count(cells as usize + 2 + LANES));
+        let count = |samples: usize| (samples + COARSE - 1).div_ceil(COARSE);
+        let across = slide(&coarse, wide, false, count(cells as usize + 2 + LANES));
         CrestWindows {
-            wide: self.wide,
-            high: self.high,
-            highest: slide(&across, self.wide, true, count(cells as usize + 2)),
+            wide,
+            high,
+            highest: slide(&across, wide, true, count(cells as usize + 2)),
         }
     }
 }
@@ -98,31 +117,22 @@ pub(super) struct CrestWindows {
 }
 
 impl CrestWindows {
-    /// The greatest height of a stretch whose north-western corner, as the first of some samples sees it, is (x, z).
-    pub(super) fn highest(&self, x: i64, z: i64) -> f32 {
-        // What lies west or north of the DEM holds nothing.
-        let (x, z) = (x.max(0) as usize / CREST, z.max(0) as usize / CREST);
-        if x < self.wide && z < self.high {
-            self.highest[z * self.wide + x]
-        } else {
-            f32::NEG_INFINITY
-        }
-    }
-
     /// The greatest height of `rect`, and of what lies near it.
     pub(super) fn over(&self, rect: Rect) -> f32 {
-        let side = CREST as i64;
-        let blocks = |from: i64, until: i64, count: usize| {
-            (from.div_euclid(side).clamp(0, count as i64) as usize)
-                ..((until + side - 1).div_euclid(side).clamp(0, count as i64) as usize)
-        };
-        let mut most = f32::NEG_INFINITY;
+        let (across, down) = (
+            blocks(rect.x0, rect.x1, COARSE, self.wide),
+            blocks(rect.z0, rect.z1, COARSE, self.high),
+        );
         // Windows are more than 4 blocks long.
-        for z in blocks(rect.z0, rect.z1, self.high).step_by(4) {
-            for x in blocks(rect.x0, rect.x1, self.wide).step_by(4) {
-                most = greater(most, self.highest[z * self.wide + x]);
-            }
-        }
-        most
+        down.step_by(4)
+            .flat_map(|z| self.highest[z * self.wide..][across.clone()].iter().step_by(4))
+            .fold(f32::NEG_INFINITY, |most, &h| greater(most, h))
     }
+}
+
+/// The blocks of `side` samples that hold those from one to another, of `count`.
+fn blocks(from: i64, until: i64, side: usize, count: usize) -> std::ops::Range<usize> {
+    let side = side as i64;
+    let within = |block: i64| block.clamp(0, count as i64) as usize;
+    within(from.div_euclid(side))..within((until + side - 1).div_euclid(side))
 }

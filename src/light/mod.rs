@@ -1,12 +1,13 @@
 //! Light on the terrain: the sun's share and the sky's share of every sample, traced over the DEM's surface.
 //!
-//! `rays`, `crests` and `relief` find how high the terrain stands in a direction, `sun`, `sky` and `day` make light of it, [`light_levels`]
-//! and, row by row, [`LightLevels`] filter it into levels like the heights, and `fill` spreads each under its voids. All of it is traced
-//! over `S0`, level 0; no data, and what lies beyond the DEM, neither casts a shadow nor blocks the sky.
+//! `rays`, `strips` and `crests` say where to look for how high the terrain stands in a direction, `sight` looks;
+//! `sun`, `sky` and `day` make light of it, [`light_levels`] and, row by row, [`LightLevels`] filter it into levels
+//! like the heights, and `fill` spreads each under its voids. All of it is traced over `S0`, level 0; no data, and
+//! what lies beyond the DEM, neither casts a shadow nor blocks the sky.
 //!
-//! Azimuths are degrees clockwise from true north; [`Earth`] says where the grid's north is, and how the ground curves.
-//! [`Sun::at`] is the sun of a time and place. Heights are metres less [`Grid::base_m`], row by row, finite or NaN for no
-//! data.
+//! Azimuths are degrees clockwise from true north; [`Earth`] says where the grid's north is, and how the ground
+//! curves. [`Sun::at`] is the sun of a time and place. Heights are metres less [`Grid::base_m`], row by row, finite or
+//! NaN for no data.
 
 use half::f16;
 
@@ -25,10 +26,15 @@ mod horizon;
 mod levels;
 mod normal;
 mod rays;
+mod region;
 mod relief;
+mod sight;
 mod sky;
+mod stage;
+mod strips;
 mod sun;
 mod sun_at;
+mod tops;
 
 pub use crests::{CREST, Crests};
 pub(crate) use day::disc_coefficients;
@@ -104,8 +110,9 @@ pub fn trace_light(
 }
 
 /// The light of all of [`Grid::file_levels`] from that of level 0, `heights` saying where that is void: filtered like
-/// heights in f32 and clamped to 0 to 1 on each level, voids left out as they are there; only what is returned is rounded
-/// to f16, and filled outward from valid samples under the voids. See [`LightLevels`], which makes the same row by row.
+/// heights in f32 and clamped to 0 to 1 on each level, voids left out as they are there; only what is returned is
+/// rounded to f16, and filled outward from valid samples under the voids. See [`LightLevels`], which makes the same
+/// row by row.
 ///
 /// # Errors
 /// [`ErrorKind::Misuse`] where the grid is impossible or a length is not the grid's; [`ErrorKind::Cancelled`].

@@ -2,26 +2,17 @@
 //!
 //! Along a ray from a sample the surface is linear between its crossings with columns, rows and the diagonals from
 //! north-west to south-east. So a grid has one list of crossings for an azimuth: two ends, the share of the way
-//! between them, the distance. They come in stages of as many cells along the axis that the ray runs along; within a
-//! stage consecutive crossings are joined into runs of few cells, those into longer ones: a tree, laid out so that a walk
-//! over it goes forward only.
+//! between them, the distance. They come in stages of as many cells along the axis that the ray runs along.
 //!
 //! On an earth of radius R the ground at distance t lies lower by `t^2 / 2R`, and the tangent by `t / 2R`.
 
+use super::stage::{Crossing, Place, STAGE, Stage};
+use super::strips::Strips;
 use crate::grid::{Grid, MAX_SIZE, Rect};
-
-/// Cells of a stage along the axis that the ray runs along.
-pub(super) const STAGE: i64 = 256;
-
-/// Cells that a run spans at most, longest runs first.
-pub(super) const SPANS: [i64; 3] = [64, 16, 4];
 
 /// Stages that the rays of one light keep in all directions together; those farther out are made anew by whoever needs
 /// them. One takes some 33 KiB.
 const KEPT: u32 = 768;
-
-/// The row stride of what the ends of crossings are offsets in: a stage as all samples of a block see it fits.
-pub(super) const STRIDE: usize = 544;
 
 /// The part of a cell that counts as no part: a crossing this near to a sample passes through it.
 const SNAP: f64 = 1e-9;
@@ -60,49 +51,8 @@ pub(super) struct Rays {
     /// Stages until the DEM ends for every sample.
     stages: i64,
     kept: Vec<Stage>,
-}
-
-/// The crossings of a stage.
-#[derive(Default)]
-pub(super) struct Stage {
-    pub(super) crossings: Vec<Crossing>,
-    /// Runs, each before those it is made of.
-    pub(super) runs: Vec<Run>,
-    /// The samples at the ends of its crossings, relative to the rays' own.
-    pub(super) hull: Rect,
-    /// As of a run that holds them all.
-    pub(super) per_m: f32,
-    pub(super) drop: f32,
-    /// While it is made: the samples at the ends of each crossing.
-    boxes: Vec<Rect>,
-}
-
-/// A crossing: height = that of end `a` + `weight` (that of end `b` - that of end `a`).
-pub(super) struct Crossing {
-    /// The ends, as offsets among samples whose rows are [`STRIDE`] apart.
-    pub(super) a: i32,
-    pub(super) b: i32,
-    pub(super) weight: f32,
-    /// One over the distance in metres.
-    pub(super) per_m: f32,
-    /// By how much the curved earth lowers the tangent.
-    pub(super) drop: f32,
-}
-
-/// Consecutive crossings whose ends lie within [`SPANS`]`[depth]` cells of the north-west corner of them all.
-pub(super) struct Run {
-    pub(super) depth: u8,
-    /// Its crossings.
-    pub(super) first: u32,
-    pub(super) end: u32,
-    /// The run that follows where this one is left out.
-    pub(super) next: u32,
-    /// That corner, relative to the north-western one of the stage.
-    pub(super) corner: [u16; 2],
-    /// One over the distance of its first crossing, in metres.
-    pub(super) per_m: f32,
-    /// By how much the earth's curve lowers its tangents at least, and the gain that is not sought.
-    pub(super) drop: f32,
+    /// What their runs pass over.
+    strips: Strips,
 }
 
 impl Rays {
@@ -120,11 +70,16 @@ impl Rays {
             slack: slack as f32,
             stages: (longest + STAGE - 1) / STAGE,
             kept: Vec::new(),
+            strips: Strips::default(),
         };
+        let signs = [gx, gz].map(|rate| if rate < 0.0 { -1 } else { 1 });
+        rays.strips = Strips::new(along, rays.lean(), signs, longest);
         for k in 0..rays.stages.min((KEPT / directions).into()) {
             let mut stage = Stage::default();
             rays.cross(k, &mut stage);
-            stage.boxes = Vec::new();
+            stage.places = Vec::new();
+            stage.crossings.shrink_to_fit();
+            stage.runs.shrink_to_fit();
             rays.kept.push(stage);
         }
         rays
@@ -142,6 +97,16 @@ impl Rays {
         }
         self.cross(k, room);
         room
+    }
+
+    /// What their runs pass over.
+    pub(super) fn strips(&self) -> &Strips {
+        &self.strips
+    }
+
+    /// By how many cells a ray passes on along the other axis for each along its own, 0 to 1.
+    fn lean(&self) -> f64 {
+        (self.rates[1 - self.along] / self.rates[self.along]).abs()
     }
 
     /// As of a run that holds stage `k`, above 0, and all beyond.
@@ -179,8 +144,7 @@ impl Rays {
         };
         let (mut next, last) = (passed(k).map(|n| n + 1), passed(k + 1));
         stage.crossings.clear();
-        stage.boxes.clear();
-        stage.runs.clear();
+        stage.places.clear();
         let mut last_sample = None;
         loop {
             let distance = |kind: usize| {
@@ -223,42 +187,25 @@ impl Rays {
                 per_m: (1.0 / t) as f32,
                 drop: (0.5 * t / self.radius_m) as f32,
             });
-            stage.boxes.push(Rect::new(a[0], a[1], b[0] + 1, b[1] + 1));
+            // A line ends the cell before it.
+            let passed = if kind == self.along {
+                line.abs() - 1
+            } else {
+                (t * self.rates[self.along].abs()).floor() as i64
+            };
+            stage.places.push(Place {
+                cell: (passed - k * STAGE).clamp(0, STAGE - 1),
+                ends: Rect::new(a[0], a[1], b[0] + 1, b[1] + 1),
+            });
         }
-        stage.finish(self.slack);
-    }
-}
-
-impl Stage {
-    /// Joins its crossings, whose ends are those of `boxes`, into runs.
-    fn finish(&mut self, slack: f32) {
-        let Some(first) = self.crossings.first() else {
-            self.hull = Rect::EMPTY;
-            return;
-        };
-        (self.per_m, self.drop) = (first.per_m, first.drop + slack);
-        self.hull = self
-            .boxes
-            .iter()
-            .fold(self.boxes[0], |hull, ends| joined(hull, *ends));
-        for (crossing, ends) in self.crossings.iter_mut().zip(&self.boxes) {
-            let offset = |x: i64, z: i64| ((z - self.hull.z0) * STRIDE as i64 + x - self.hull.x0) as i32;
-            crossing.a = offset(ends.x0, ends.z0);
-            crossing.b = offset(ends.x1 - 1, ends.z1 - 1);
+        // On its way.
+        let mut last = 0;
+        for place in &mut stage.places {
+            last = place.cell.max(last);
+            place.cell = last;
         }
-        let mut tree = Tree {
-            crossings: &self.crossings,
-            boxes: &self.boxes,
-            origin: [self.hull.x0, self.hull.z0],
-            slack,
-            runs: &mut self.runs,
-        };
-        tree.join(0, 0, self.boxes.len());
+        stage.finish(self.slack, |cell| self.strips.begin(k * STAGE + cell));
     }
-}
-
-fn joined(a: Rect, b: Rect) -> Rect {
-    Rect::new(a.x0.min(b.x0), a.z0.min(b.z0), a.x1.max(b.x1), a.z1.max(b.z1))
 }
 
 /// Position `p`, in cells, as a sample and the share of the way to the next; none where there is no such sample.
@@ -270,53 +217,6 @@ fn between(p: f64) -> Option<(i64, f64)> {
         Some((nearest as i64, 0.0))
     } else {
         Some((p.floor() as i64, p - p.floor()))
-    }
-}
-
-/// Runs in the making.
-struct Tree<'a> {
-    crossings: &'a [Crossing],
-    /// The samples at the ends of each crossing.
-    boxes: &'a [Rect],
-    origin: [i64; 2],
-    slack: f32,
-    runs: &'a mut Vec<Run>,
-}
-
-impl Tree<'_> {
-    /// Joins crossings `first..end` into runs of `SPANS[depth]` cells and less.
-    fn join(&mut self, depth: usize, first: usize, end: usize) {
-        let mut from = first;
-        while from < end {
-            let mut hull = self.boxes[from];
-            let mut to = from + 1;
-            while to < end {
-                let joined = joined(hull, self.boxes[to]);
-                if joined.width() > SPANS[depth] + 1 || joined.height() > SPANS[depth] + 1 {
-                    break;
-                }
-                hull = joined;
-                to += 1;
-            }
-            let at = self.runs.len();
-            self.runs.push(Run {
-                depth: depth as u8,
-                first: from as u32,
-                end: to as u32,
-                next: 0,
-                corner: [
-                    (hull.x0 - self.origin[0]) as u16,
-                    (hull.z0 - self.origin[1]) as u16,
-                ],
-                per_m: self.crossings[from].per_m,
-                drop: self.crossings[from].drop + self.slack,
-            });
-            if depth + 1 < SPANS.len() {
-                self.join(depth + 1, from, to);
-            }
-            self.runs[at].next = self.runs.len() as u32;
-            from = to;
-        }
     }
 }
 
@@ -336,8 +236,11 @@ mod tests {
             let mut lines = 0;
             for k in 0..kept.stages() {
                 let (a, b) = (kept.stage(k, &mut here), anew.stage(k, &mut there));
-                assert_eq!((a.hull, a.per_m, a.drop), (b.hull, b.per_m, b.drop));
-                let ends = |stage: &Stage| -> Vec<(i32, i32)> {
+                let hulls = |stage: &Stage| -> Vec<(Rect, u32)> {
+                    stage.runs.iter().map(|r| (r.hull, r.next)).collect()
+                };
+                assert_eq!(hulls(a), hulls(b));
+                let ends = |stage: &Stage| -> Vec<(i64, i64)> {
                     stage.crossings.iter().map(|c| (c.a, c.b)).collect()
                 };
                 assert_eq!(ends(a), ends(b));
@@ -346,12 +249,11 @@ mod tests {
                     assert!(crossing.per_m <= last);
                     last = crossing.per_m;
                 }
-                assert!(
-                    kept.swept(k, 1, Rect::new(0, 0, 1, 1)).contains_rect(a.hull),
-                    "{azimuth_deg}: {:?}",
-                    a.hull
-                );
-                assert!(k == 0 || a.per_m <= kept.beyond(k).0 && a.drop >= kept.beyond(k).1);
+                let swept = kept.swept(k, 1, Rect::new(0, 0, 1, 1));
+                for run in &a.runs {
+                    assert!(swept.contains_rect(run.hull), "{azimuth_deg}: {:?}", run.hull);
+                    assert!(k == 0 || run.per_m <= kept.beyond(k).0 && run.drop >= kept.beyond(k).1);
+                }
                 lines += a.crossings.len() as i64;
             }
             // Columns, rows and diagonals as far as the last stage goes, less what meets in samples.

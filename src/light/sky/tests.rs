@@ -2,6 +2,9 @@
 
 use super::*;
 use crate::light::tests::{shape, sky};
+use crate::progress::Silent;
+use crate::pyramid::random::Random;
+use crate::work::Serial;
 
 #[test]
 fn the_sky_over_planes() {
@@ -108,4 +111,51 @@ fn the_arc_cotangent_is_right() {
             assert!((got - want).abs() < 1e-6, "{x}: {got} against {want}");
         }
     }
+}
+
+/// The tangents of the horizon at `azimuth_deg` over `heights` that is sought but for gains of `slack`.
+fn tangents(heights: &[f32], grid: &Grid, azimuth_deg: f64, slack: f64) -> Vec<f32> {
+    let whole = Whole::of(heights, grid);
+    let relief = Relief::new(grid, &whole, Crests::of(heights, grid, &Serial));
+    let rays = Rays::new(grid, azimuth_deg, f64::INFINITY, slack, 16);
+    all_rows(grid, "horizon", &Silent, |rows, out| {
+        each_block(&relief, rows, out, &Serial, |block, scratch, tangents| {
+            relief.settle(block, scratch)?;
+            relief.raise(&rays, block, f32::INFINITY, tangents, scratch)
+        })
+    })
+    .expect("traces")
+}
+
+#[test]
+fn the_horizon_is_short_of_the_highest_by_no_more_than_what_is_not_sought() {
+    let [mut short, mut loose] = [0; 2];
+    for (grid, azimuths_deg) in [
+        (Grid::new(3000, 40, [25.0, 20.0]), [90.0, 270.3]),
+        (Grid::new(600, 500, [58.0, 27.0]), [22.5, 292.5]),
+    ] {
+        let mut random = Random::new(79);
+        let mut heights = random.heights(grid.size.samples(), 0.0, 5.0, 0.0);
+        for h in &mut heights {
+            if random.unit() < 0.01 {
+                *h += random.between(0.0, 400.0) as f32;
+            }
+        }
+        for azimuth_deg in azimuths_deg {
+            let want = tangents(&heights, &grid, azimuth_deg, 0.0);
+            let got = tangents(&heights, &grid, azimuth_deg, SLACK);
+            let control = tangents(&heights, &grid, azimuth_deg, 10.0 * SLACK);
+            for ((want, got), control) in want.into_iter().zip(got).zip(control) {
+                let by = f64::from(want - got);
+                assert!(
+                    (-1e-6..=SLACK + 1e-6).contains(&by),
+                    "{azimuth_deg}: {got} for {want}"
+                );
+                short += u32::from(by > 0.0);
+                loose += u32::from(f64::from(want - control) > SLACK + 1e-6);
+            }
+        }
+    }
+    assert!(short > 100, "{short}: nothing was left out");
+    assert!(loose > 100, "{loose}: ten times as much must show");
 }
