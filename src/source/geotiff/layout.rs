@@ -85,7 +85,12 @@ impl Layout {
     /// samples where those of the band are picked from among them.
     pub(super) fn decoding_bytes(&self) -> u64 {
         let stored = self.counts.iter().copied().max().unwrap_or(0);
-        let all = self.row_bytes() * self.stored_rows.min(self.height) as u64;
+        let rows = if self.grouped {
+            self.block_height
+        } else {
+            self.stored_rows
+        };
+        let all = self.row_bytes() * rows.min(self.height) as u64;
         let band = self.interleaved == 1 && usize::from(self.bits) == 8 * self.kind.bytes();
         match self.compression {
             Compression::None if band => 0,
