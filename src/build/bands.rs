@@ -6,10 +6,10 @@ use std::time::Instant;
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
 use crate::progress::Progress;
-use crate::source::HeightSource;
+use crate::source::{HeightSource, READ_ROWS};
 
 /// Rows of a band.
-pub(super) const BAND_ROWS: i64 = 256;
+pub(super) const BAND_ROWS: i64 = READ_ROWS;
 
 /// A band of whole rows of level 0.
 pub(super) struct Band {

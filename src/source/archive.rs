@@ -193,6 +193,10 @@ impl ReadAt for Slice {
         self.size
     }
 
+    fn held_bytes(&self) -> u64 {
+        self.bytes.held_bytes()
+    }
+
     fn read_exact_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
         let end = offset.checked_add(out.len() as u64);
         if end.is_none_or(|end| end > self.size) {
@@ -229,6 +233,10 @@ impl Deflated {
 impl ReadAt for Deflated {
     fn size_bytes(&self) -> u64 {
         self.size
+    }
+
+    fn held_bytes(&self) -> u64 {
+        self.size + self.bytes.held_bytes()
     }
 
     fn read_exact_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
@@ -281,7 +289,24 @@ pub(super) fn gunzip(name: &str, bytes: Arc<dyn ReadAt>) -> Result<Arc<dyn ReadA
     let mut decoder = decoder.take(most.saturating_add(1));
     decoder.read_to_end(&mut out).map_err(|e| unpacking(name, e))?;
     check_ratio(name, out.len() as u64, packed)?;
-    Ok(Arc::new(out))
+    Ok(Arc::new(Unpacked(out)))
+}
+
+/// An unpacked file.
+struct Unpacked(Vec<u8>);
+
+impl ReadAt for Unpacked {
+    fn size_bytes(&self) -> u64 {
+        self.0.size_bytes()
+    }
+
+    fn held_bytes(&self) -> u64 {
+        self.0.capacity() as u64
+    }
+
+    fn read_exact_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
+        self.0.read_exact_at(offset, out)
+    }
 }
 
 #[cfg(test)]

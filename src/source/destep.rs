@@ -20,7 +20,7 @@ use std::sync::{Mutex, PoisonError};
 
 use self::block::Block;
 use super::processors::Processors;
-use super::{Description, HeightSource, Reads};
+use super::{Description, HeightSource, READ_ROWS, Reads};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
 use crate::progress::Progress;
@@ -46,9 +46,6 @@ const PARTS: f64 = 32.0;
 
 /// Columns that a task smooths.
 const TASK_COLUMNS: i64 = 256;
-
-/// Rows that are read at once, for [`HeightSource::held_bytes`].
-const READ_ROWS: i64 = 256;
 
 /// Another DEM without its steps.
 pub struct Destepped<'a> {

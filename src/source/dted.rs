@@ -263,6 +263,10 @@ impl HeightSource for Dted {
         &self.description
     }
 
+    fn held_bytes(&self) -> u64 {
+        self.bytes.held_bytes() + size_of_val(&self.columns[..]) as u64
+    }
+
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {
         self.description.check_rect(rect, out)?;
         let (rows, width) = (rect.height() as usize, rect.width() as usize);

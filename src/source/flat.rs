@@ -190,6 +190,10 @@ impl HeightSource for Flat {
         Ok(())
     }
 
+    fn held_bytes(&self) -> u64 {
+        self.bytes.held_bytes() + BAND_BYTES
+    }
+
     fn remarks(&self, progress: &dyn Progress) -> Result<Vec<String>> {
         if self.layout.coding.sample.integer() {
             return Ok(Vec::new());

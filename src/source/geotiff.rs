@@ -33,7 +33,7 @@ use self::raster::Raster;
 use self::samples::Samples;
 use super::held::{HEIGHTS_ASSUMED, Scale, size};
 use super::processors::Processors;
-use super::{Description, HeightSource, OpenOptions, Overview, ReadAt, Reads};
+use super::{Description, HeightSource, OpenOptions, Overview, READ_ROWS, ReadAt, Reads};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
 use crate::progress::Progress;
@@ -157,8 +157,11 @@ impl HeightSource for GeoTiff {
     }
 
     fn held_bytes(&self) -> u64 {
+        // Of a mask the blocks, and what they say of the rows that are read at once.
+        let row_bytes = size_of::<f32>() as u64 * self.description.grid.size.width as u64;
         let mask = self.mask.as_ref().map_or(0, Raster::held_bytes);
-        self.raster.held_bytes() + mask
+        let hidden = self.mask.as_ref().map_or(0, |_| READ_ROWS as u64 * row_bytes);
+        self.file.held_bytes() + self.raster.held_bytes() + mask + hidden
     }
 
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {

@@ -50,6 +50,9 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Rect};
 use crate::progress::Progress;
 
+/// Rows that are read at once where a DEM is read from north to south: what [`HeightSource::held_bytes`] speaks of.
+pub(crate) const READ_ROWS: i64 = 256;
+
 /// What a DEM says of itself, and what was assumed of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Description {
@@ -99,8 +102,8 @@ pub trait HeightSource: Send + Sync {
     /// Where the file is damaged, vanished, or uses what this crate does not read.
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()>;
 
-    /// The most memory that it holds while it is read from north to south, in bytes; what it takes on the way back is not
-    /// counted.
+    /// The most memory that it holds while it is read from north to south, 256 rows at once, in bytes: what it takes for
+    /// that beside the heights it gives; what it takes on the way back, and while it is opened, is not counted.
     fn held_bytes(&self) -> u64 {
         0
     }

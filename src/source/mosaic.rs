@@ -10,12 +10,12 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use self::layout::Tile;
-use super::{Description, HeightSource, OpenOptions, geographic};
+use super::{Description, HeightSource, OpenOptions, READ_ROWS, geographic};
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::Rect;
 use crate::progress::Progress;
 
-/// Tiles that are kept open hold at most this much, counted as 4 bytes a sample, if they are more than one.
+/// Tiles that are kept open hold at most this much, if they are more than one.
 const CACHE_BYTES: u64 = 256 << 20;
 /// Tiles that are kept open at most: each may hold a file open.
 const CACHE_TILES: usize = 64;
@@ -46,7 +46,7 @@ impl Mosaic {
             let source = open(path, options)?;
             let description = source.description();
             let first = first.get_or_insert_with(|| description.clone());
-            tiles.push(Tile::new(path.clone(), description, first)?);
+            tiles.push(Tile::new(path.clone(), description, source.held_bytes(), first)?);
             common.add(description);
         }
         let first = first.ok_or_else(|| Error::new(ErrorKind::Misuse, name, "holds no DEM"))?;
@@ -79,6 +79,14 @@ impl Mosaic {
             Some(at) => cache.remove(at),
             None => {
                 let tile = &self.tiles[k];
+                // Room is made before it is opened.
+                let held = |cache: &[(usize, Arc<dyn HeightSource>)]| {
+                    let held = cache.iter().map(|(k, _)| self.tiles[*k].held_bytes);
+                    held.fold(tile.held_bytes, u64::saturating_add)
+                };
+                while !cache.is_empty() && (cache.len() >= CACHE_TILES || held(&cache) > CACHE_BYTES) {
+                    cache.remove(0);
+                }
                 let source: Arc<dyn HeightSource> = (self.open)(&tile.path, &self.options)?.into();
                 if source.description().grid.size != tile.size() {
                     let what = "has another size than when it was first opened";
@@ -89,13 +97,6 @@ impl Mosaic {
         };
         let source = entry.1.clone();
         cache.push(entry);
-        let held = |cache: &[(usize, Arc<dyn HeightSource>)]| {
-            let samples = cache.iter().map(|(k, _)| self.tiles[*k].rect.area() as u64);
-            4 * samples.sum::<u64>()
-        };
-        while cache.len() > 1 && (cache.len() > CACHE_TILES || held(&cache) > CACHE_BYTES) {
-            cache.remove(0);
-        }
         Ok(source)
     }
 
@@ -191,7 +192,12 @@ impl HeightSource for Mosaic {
     }
 
     fn held_bytes(&self) -> u64 {
-        CACHE_BYTES.min(4 * self.description.grid.size.samples() as u64)
+        let held = || self.tiles.iter().map(|tile| tile.held_bytes);
+        let all = held().fold(0, u64::saturating_add);
+        let open = all.min(held().max().unwrap_or(0).max(CACHE_BYTES));
+        // A tile's part of the rows that are read, before it is laid over the others'.
+        let widest = self.tiles.iter().map(|tile| tile.rect.width()).max().unwrap_or(0);
+        open + (size_of::<f32>() as i64 * READ_ROWS * widest) as u64
     }
 
     fn read(&self, rect: Rect, out: &mut [f32]) -> Result<()> {

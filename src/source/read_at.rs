@@ -8,6 +8,11 @@ pub trait ReadAt: Send + Sync {
     /// Its length in bytes.
     fn size_bytes(&self) -> u64;
 
+    /// Bytes of memory that it holds beside its callers', once it has been read: none for a file on disk.
+    fn held_bytes(&self) -> u64 {
+        0
+    }
+
     /// Fills `out` from `offset` on.
     ///
     /// # Errors

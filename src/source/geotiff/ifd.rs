@@ -92,6 +92,11 @@ struct Entry {
 }
 
 impl File {
+    /// Bytes of memory that the file's own bytes take.
+    pub(super) fn held_bytes(&self) -> u64 {
+        self.bytes.held_bytes()
+    }
+
     /// Reads the header of `bytes`; returns where the first directory stands as well.
     ///
     /// # Errors

@@ -81,6 +81,25 @@ pub(super) struct Layout {
 }
 
 impl Layout {
+    /// The most that decoding a block takes beside its samples of the band, in bytes: what is stored, and all of its
+    /// samples where those of the band are picked from among them.
+    pub(super) fn decoding_bytes(&self) -> u64 {
+        let stored = self.counts.iter().copied().max().unwrap_or(0);
+        let rows = if self.grouped {
+            self.block_height
+        } else {
+            self.stored_rows
+        };
+        let all = self.row_bytes() * rows.min(self.height) as u64;
+        let band = self.interleaved == 1 && usize::from(self.bits) == 8 * self.kind.bytes();
+        match self.compression {
+            Compression::None if band => 0,
+            Compression::None => all,
+            _ if band => stored.min(2 * all),
+            _ => stored.min(2 * all) + all,
+        }
+    }
+
     /// Reads how band `band`, counted from 0, of the image of `directory` is stored.
     ///
     /// # Errors

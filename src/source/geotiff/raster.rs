@@ -12,12 +12,15 @@ use super::samples::Samples;
 use crate::error::Result;
 use crate::grid::Rect;
 use crate::source::Reads;
+use crate::source::processors::Processors;
 use crate::work::{Work, each_chunk};
 
 /// Bytes of blocks that are kept at least, and at most; in between, two rows of blocks.
 const CACHE_BYTES: [u64; 2] = [32 << 20, 192 << 20];
 /// Bytes of blocks that are decoded before any of them is turned into heights.
 const BATCH_BYTES: i64 = 8 << 20;
+/// Bytes by which a block is found: its offset, its length and its place in the cache.
+const LISTED_BYTES: u64 = 64;
 /// Rows that one task turns into heights.
 const TASK_ROWS: usize = 16;
 
@@ -56,14 +59,18 @@ impl Raster {
         &self.layout
     }
 
-    /// The most that is held of decoded blocks, in bytes: the cache, and blocks on their way into it.
+    /// The most that is held of blocks, in bytes: the cache, blocks on their way into it, and those that are being
+    /// decoded, as they are stored and where they hold more than the band.
     pub(super) fn held_bytes(&self) -> u64 {
         let Layout {
             width, height, kind, ..
         } = &self.layout;
         let whole = (width * height) as u64 * kind.bytes() as u64;
         let row_of_blocks = whole / self.layout.down().max(1) as u64;
-        whole.min(self.cache_bytes + row_of_blocks.max(BATCH_BYTES as u64))
+        let decoded = whole.min(self.cache_bytes + row_of_blocks.max(BATCH_BYTES as u64));
+        let blocks = (self.layout.across() * self.layout.down()) as u64;
+        let at_once = blocks.min(Processors::count() as u64);
+        decoded + at_once * self.layout.decoding_bytes() + blocks * LISTED_BYTES
     }
 
     /// What reading has met so far.

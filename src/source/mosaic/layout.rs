@@ -16,14 +16,21 @@ pub(super) struct Tile {
     /// Its samples on the mosaic's grid; until [`union`], on a grid whose (0, 0) is the first tile's.
     pub(super) rect: Rect,
     pub(super) base_m: f64,
+    /// What it holds while it is open.
+    pub(super) held_bytes: u64,
 }
 
 impl Tile {
-    /// The tile `path`, laid on the grid of the first one.
+    /// The tile `path`, which holds `held_bytes` while it is open, laid on the grid of the first one.
     ///
     /// # Errors
     /// [`ErrorKind::Unsupported`] where it tells no place, or another system, step or phase than the first.
-    pub(super) fn new(path: PathBuf, description: &Description, first: &Description) -> Result<Self> {
+    pub(super) fn new(
+        path: PathBuf,
+        description: &Description,
+        held_bytes: u64,
+        first: &Description,
+    ) -> Result<Self> {
         let off = |what: String| {
             Err(Error::new(ErrorKind::Unsupported, path.display(), what)
                 .advice(format!("warp the tiles onto one grid, that of {}", first.name)))
@@ -64,6 +71,7 @@ impl Tile {
             path,
             rect: size.rect().moved(at[0], at[1]),
             base_m: description.grid.base_m,
+            held_bytes,
         })
     }
 
