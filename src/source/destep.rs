@@ -1,7 +1,7 @@
 //! A DEM of whole steps, as of whole metres, with the terraces of its rounding smoothed away.
 //!
 //! What was rounded lies within half a step of what is stored. Among the surfaces that do so this takes a smooth one: it
-//! bends each sample towards its neighbours ([`bend`]) at distances of 16, 8, 4, 2 and 1 samples, along rows and then along
+//! bends each sample towards its neighbours (`bend` in `destep/block.rs`) at distances of 16, 8, 4, 2 and 1 samples, along rows and then along
 //! columns, and after each distance puts what strayed back to within half a step (projection onto a convex set; P. L.
 //! Combettes, *The Foundations of Set Theoretic Estimation*, 1993). So a terrace of up to some 30 samples becomes the
 //! slope that it was, and no sample moves by more than half a step, rounding to a thirty-second of the step included.

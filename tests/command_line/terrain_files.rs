@@ -1,6 +1,7 @@
 //! Terrain files as they are made, told of and lit anew.
 
 use std::fs;
+use std::path::Path;
 
 use crate::{done, fails, names, run};
 
@@ -31,7 +32,7 @@ fn info_says_what_a_terrain_file_is_and_verify_finds_what_is_damaged() {
             .unwrap_or_else(|| panic!("no {name} in {json}"))
     };
     let documented = "format type width height spacing min max voids vertical_unit vertical_datum crs unit pixel origin \
-        extent registration levels light day assumed noticed";
+        extent registration levels destep light day assumed noticed";
     let places: Vec<usize> = documented.split_whitespace().map(at).collect();
     assert!(places.is_sorted(), "{json}");
     assert_eq!(info.as_object().unwrap().len(), places.len(), "{json}");
@@ -321,4 +322,49 @@ fn a_day_is_traced_told_and_asked_for_by_its_time() {
             both.err
         );
     }
+}
+
+#[test]
+fn only_a_dem_with_steps_is_freed_of_them_and_info_and_the_statistics_say_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let dem = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/N42E001.hgt");
+    let dem = dem.to_str().unwrap();
+    let part = ["preprocess", dem, "--srcwin", "400,700,200,150", "--no-light"];
+    let made = [&part[..], &["--destep", "-o", "a.exr", "--stats", "a.json"]].concat();
+    let said = run(here, &made);
+    assert_eq!(said.status, 0, "{}", said.err);
+    let median = "true over stored 1.000000 in the median";
+    assert!(said.err.contains(median), "{}", said.err);
+    let stats: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(here.join("a.json")).unwrap()).unwrap();
+    assert!(stats["checked_patches"].as_u64().unwrap() > 0);
+    let ratio = |name: &str| stats[name].as_f64().unwrap();
+    assert!(ratio("error_ratio_least") <= ratio("error_ratio_median") && ratio("error_ratio_median") <= 1.0);
+    let info =
+        |file| -> serde_json::Value { serde_json::from_str(&done(here, &["info", "--json", file])).unwrap() };
+    assert_eq!(info("a.exr")["destep"], 1.0);
+    let text = done(here, &["info", "a.exr"]);
+    assert!(
+        text.contains("steps of 1 m smoothed away, by at most 0.5 m"),
+        "{text}"
+    );
+    done(here, &[&part[..], &["-o", "b.exr", "--quiet"]].concat());
+    assert!(info("b.exr")["destep"].is_null());
+
+    let floats = ["preprocess", "synth:64:1", "--destep", "-o", "c.exr"];
+    fails(
+        here,
+        1,
+        &floats,
+        &["float32", "not whole numbers of one step", "leave out"],
+    );
+    let again = ["preprocess", "b.exr", "--destep", "-o", "c.exr"];
+    fails(
+        here,
+        1,
+        &again,
+        &["b.exr", "heights are fixed", "when it is made"],
+    );
+    assert_eq!(names(here), ["a.exr", "a.json", "b.exr"]);
 }
