@@ -1,7 +1,7 @@
 #!/bin/sh
 # What 16 times the samples cost preprocessing: a DEM of 16384 x 16384 against the sixteen of 4096 x 4096 that it is cut
-# into, together and so over the very same ground, and against 16 times the whole of that ground at 4096 x 4096. Printed
-# are the seconds of the pyramid, the sun and the sky, their ratios (1 where a sample costs the same), and the most memory
+# into, on average and so over the very same ground, and against the whole of that ground at 4096 x 4096. Printed are the
+# seconds of all but light, of the sun and of the sky, how many times as long the large one takes, and the most memory
 # that each run took beside its ceiling.
 #
 #   tools/compare_scaling.sh       (DIRECTIONS of the sky, default 16; MEMORY, default 512M)
@@ -30,7 +30,7 @@ run() {
     log=$2
     shift 2
     /usr/bin/time -o rss -f %M "$own" preprocess "$dem" -q -f --memory "$memory" -o a.terrain.exr --stats stats "$@"
-    sed 's/.*"pyramid_s":\([0-9.e-]*\),.*"sun_s":\([0-9.e-]*\),"sky_s":\([0-9.e-]*\),.*/\1 \2 \3/' stats >> "$log"
+    sed 's/.*"sun_s":\([0-9.e-]*\),"sky_s":\([0-9.e-]*\),.*"total_s":\([0-9.e-]*\),.*/\1 \2 \3/' stats >> "$log"
     echo "$dem: at most $(($(cat rss) / 1024)) MiB of $memory"
 }
 resampled 16384
@@ -44,14 +44,19 @@ run 16384.tif large --sky-directions "$directions"
 resampled 4096
 run 4096.tif whole --sky-directions "$directions"
 ratio() {
-    awk -v what="$2" -v times="$3" '
-        FNR == NR { p += $1; sun += $2; sky += $3; next }
-        function said(name, large, small) { return sprintf("; %s %.2f to %.2f s, %.2f", name, large, small, large / small) }
-        { print "16384 against " what said("pyramid", $1, p * times) said("sun", $2, sun * times) said("sky", $3, sky * times) }
+    awk -v what="$2" '
+        FNR == NR { runs++; sun += $1; sky += $2; rest += $3 - $1 - $2; next }
+        function said(name, large, small) {
+            return sprintf("; %s %.2f and %.2f s, %.1f times", name, large, small / runs, large * runs / small)
+        }
+        {
+            print "16384 x 16384 and " what said("all but light", $3 - $1 - $2, rest) \
+                said("light", $1 + $2, sun + sky) said("sun", $1, sun) said("sky", $2, sky)
+        }
     ' "$1" large
 }
-ratio parts "its sixteen parts together" 1
-ratio whole "16 times the whole at 4096" 16
+ratio parts "one of its sixteen parts"
+ratio whole "the whole at 4096 x 4096"
 if [ "${FULL:-}" = 1 ]; then
     rm -f 16384.tif
     resampled 32768
