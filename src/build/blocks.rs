@@ -1,7 +1,8 @@
 //! Light of any kind traced over the heights of a terrain file, and put as tiles where those were just written.
 //!
-//! The heights are read back through the file's cache of tiles, so many rows at once as blocks of light are high, and
-//! whatever lies towards the light as far as it may matter; how much of that is kept changes the time, and nothing else.
+//! The heights are read back through the file's cache of tiles: some rows of blocks at once, and whatever lies towards
+//! the light as far as it may matter. How many rows and how much of that is kept changes the time, and nothing else: a far
+//! tile is read again for the next rows where it has not stayed.
 //! Few rows at a time are then filtered: each level takes rows from the next finer one as they come to be known, and a row
 //! of tiles is put as soon as it is known whole and all before it are put. So what is held does not depend on the DEM's
 //! height.
@@ -14,7 +15,7 @@ use super::tiles::put_packed;
 use crate::error::{Error, Result};
 use crate::grid::Rect;
 use crate::levels::Levels;
-use crate::light::{Crests, Ground, ROWS, Relief};
+use crate::light::{Crests, Ground, Relief};
 use crate::progress::Progress;
 use crate::terrain::layout::{Kind, TILE};
 use crate::terrain::{TerrainFile, TerrainWriter};
@@ -27,6 +28,8 @@ const BAND: i64 = 16;
 pub(super) struct Blocks<'a> {
     heights: &'a TerrainFile,
     relief: Relief<'a>,
+    /// Rows that are traced at once.
+    rows: i64,
 }
 
 /// A kind of light while it is traced and filtered.
@@ -40,7 +43,7 @@ pub(super) trait Traced: Sync {
     /// Bytes of a sample of it.
     const SAMPLE_BYTES: usize;
 
-    /// Traces `rows` of level 0 over `relief`: one block high, the next ones.
+    /// Traces `rows` of level 0 over `relief`: the next ones.
     ///
     /// # Errors
     /// What the ground meets; [`crate::ErrorKind::Cancelled`].
@@ -75,11 +78,12 @@ impl Ground for TerrainFile {
 }
 
 impl<'a> Blocks<'a> {
-    /// Those of `heights`, whose crests are `crests`.
-    pub(super) fn new(heights: &'a TerrainFile, crests: Crests) -> Self {
+    /// Those of `heights`, whose crests are `crests`, traced `rows` at once, a multiple of [`crate::light::ROWS`].
+    pub(super) fn new(heights: &'a TerrainFile, crests: Crests, rows: i64) -> Self {
         Self {
             heights,
             relief: Relief::new(heights.grid(), heights, crests),
+            rows,
         }
     }
 
@@ -103,12 +107,12 @@ impl<'a> Blocks<'a> {
         let grid = *self.heights.grid();
         let mut due = writer.layout().order_of(T::KIND).into_iter().peekable();
         progress.begin(T::NAME, grid.size.samples() as u64);
-        for z0 in (0..grid.size.height).step_by(ROWS) {
+        for z0 in (0..grid.size.height).step_by(self.rows as usize) {
             if progress.cancelled() {
                 return Err(Error::cancelled(self.heights.name()));
             }
-            let z1 = (z0 + ROWS as i64).min(grid.size.height);
-            hold(self.heights, z0, work)?;
+            let z1 = (z0 + self.rows).min(grid.size.height);
+            hold(self.heights, z0..z1, work)?;
             traced.trace(&self.relief, z0..z1, work, progress)?;
             for from in (0..z1 - z0).step_by(BAND as usize) {
                 traced.filter(from..(from + BAND).min(z1 - z0), work);
@@ -137,20 +141,15 @@ impl<'a> Blocks<'a> {
     }
 }
 
-/// Has the tiles in the cache that rows from `z0` on are likely to ask for next, each read once.
-fn hold(heights: &TerrainFile, z0: i64, work: &dyn Work) -> Result<()> {
+/// Has the tiles in the cache that `rows` are likely to ask for next, each read once.
+fn hold(heights: &TerrainFile, rows: Range<i64>, work: &dyn Work) -> Result<()> {
     let size = heights.grid().size;
     let wide = (size.width as u64).div_ceil(TILE as u64) as usize;
-    if z0 % TILE != 0 {
-        return Ok(());
-    }
-    // Of the first row of tiles nothing is there yet; the next one lies in the way of half of all light.
-    let rows = if z0 == 0 {
-        0..2
-    } else {
-        z0 / TILE + 1..z0 / TILE + 2
-    };
-    for z in rows.filter(|z| z * TILE < size.height) {
+    // Their own, of which the rows before have asked for the first, and the next, which lie in the way of half of all
+    // light.
+    let first = if rows.start == 0 { 0 } else { rows.start / TILE + 1 };
+    let tiles = first..(rows.end - 1) / TILE + 2;
+    for z in tiles.filter(|z| z * TILE < size.height) {
         let failed = std::sync::Mutex::new(None);
         work.each(wide, &|x| {
             if let Err(error) = heights.hold_heights(0, x as i64, z) {

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::grid::{Grid, Size};
+use crate::light::{LitTimes, ROWS};
 use crate::terrain::layout::TILE;
 
 /// The ceiling of preprocessing unless another is given: 512 MiB.
@@ -45,6 +46,10 @@ const FIXED_BYTES_WITH_LIGHT: u64 = 120 << 20;
 /// Decoded tiles that are kept while light is traced, at least.
 const LEAST_CACHE_BYTES: u64 = 16 << 20;
 
+/// Rows of blocks that are traced at once at most: so many times less often are far tiles read, and with more the tasks of
+/// two threads end too far apart.
+const MOST_BLOCK_ROWS: u64 = 4;
+
 /// The memory that the pyramid of a DEM of `grid` takes where it is held whole, in bytes.
 pub fn needed_bytes(grid: &Grid, light: bool) -> u64 {
     (grid.size.samples() as u64)
@@ -77,10 +82,28 @@ pub fn preprocess_bytes(grid: &Grid, light: bool, day: bool, held_bytes: u64) ->
         .saturating_add(held_bytes)
 }
 
-/// The bytes of decoded tiles that are kept while light is traced, where `left_bytes` of the ceiling are left.
-pub(super) fn cache_bytes(left_bytes: u64) -> usize {
+/// What tracing light over a DEM of `grid` takes beside what it needs at least, where `left_bytes` of the ceiling are left:
+/// the rows that are traced at once, and the bytes of decoded tiles that are kept. Where not all tiles can be, the rows are
+/// up to [`MOST_BLOCK_ROWS`] of blocks, for up to a third of what is left.
+pub(super) fn light_room(grid: &Grid, day: bool, left_bytes: u64) -> (i64, usize) {
     // Memory of tiles that are let go is not all of use for others at once.
-    usize::try_from(LEAST_CACHE_BYTES + left_bytes / 2).unwrap_or(usize::MAX)
+    let cache_bytes = |left: u64| LEAST_CACHE_BYTES + left / 2;
+    let a_sample = if day {
+        size_of::<LitTimes>()
+    } else {
+        2 * size_of::<f32>()
+    };
+    let block_row_bytes = grid.size.width as u64 * (ROWS * a_sample) as u64;
+    let more = if decoded_bytes(grid) <= cache_bytes(left_bytes) {
+        0
+    } else {
+        (left_bytes / 3 / block_row_bytes).min(MOST_BLOCK_ROWS - 1)
+    };
+    let cache_bytes = cache_bytes(left_bytes - more * block_row_bytes);
+    (
+        (1 + more as i64) * ROWS as i64,
+        usize::try_from(cache_bytes).unwrap_or(usize::MAX),
+    )
 }
 
 /// The bytes of the heights of all levels of a DEM of `grid` as tiles that are kept, and a little more.
@@ -162,6 +185,26 @@ mod tests {
                 .kind(),
             ErrorKind::Misuse
         );
+    }
+
+    #[test]
+    fn what_is_left_goes_to_rows_and_tiles_and_is_not_spent_twice() {
+        let rows = ROWS as i64;
+        for (width, height, day, left, want) in [
+            // Nothing is left; all tiles are kept; some for rows; as many rows as are of use.
+            (16_384, 16_384, false, 0, rows),
+            (4_096, 4_096, false, 370 << 20, rows),
+            (32_768, 32_768, false, 128 << 20, 2 * rows),
+            (16_384, 16_384, false, 262 << 20, 4 * rows),
+            (16_384, 16_384, true, 190 << 20, 2 * rows),
+        ] {
+            let grid = Grid::new(width, height, [1.0, 1.0]);
+            let (traced, cache) = light_room(&grid, day, left);
+            assert_eq!(traced, want, "{width} x {height}, {left}");
+            let a_row = if day { size_of::<LitTimes>() } else { 8 } as i64 * width;
+            let spent = ((traced - rows) * a_row) as u64 + cache as u64 - LEAST_CACHE_BYTES;
+            assert!(spent <= left, "{spent} of {left}");
+        }
     }
 
     #[test]

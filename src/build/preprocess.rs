@@ -189,7 +189,10 @@ pub fn preprocess(
         let heights = writer.readable(&name, &meta, || source::open_file(output.temporary()))?;
         // Each pass reads a tile once, so that nothing is kept unless all of it can be, for light to be traced over.
         let left = options.memory_bytes - needed(&description.grid);
-        let cache_bytes = options.light.map_or(0, |_| memory::cache_bytes(left));
+        let (rows, cache_bytes) = match options.light {
+            Some(_) => memory::light_room(&description.grid, options.day.is_some(), left),
+            None => (0, 0),
+        };
         let all = memory::decoded_bytes(&description.grid) <= cache_bytes as u64;
         let heights = heights.with_cache(if all { cache_bytes } else { 0 });
         let (took, crests) = write_bounds(&heights, &mut writer, &threads, progress)?;
@@ -211,7 +214,7 @@ pub fn preprocess(
                 earth: &earth,
                 filter: &options.filter,
             };
-            let blocks = Blocks::new(&heights, crests);
+            let blocks = Blocks::new(&heights, crests, rows);
             let took = write_light(&blocks, &mut writer, &lit, &threads, progress)?;
             (report.sun_s, report.sky_s) = (took.sun_s, took.sky_s);
             report.write_s += took.write_s;

@@ -38,6 +38,7 @@ pub fn relight(
 ) -> Result<PreprocessReport> {
     let Meta { grid, place, .. } = file.meta();
     let filter = filter_of(file)?;
+    let mut traced_rows = 0;
     if let Some(light) = &options.light {
         light.sun.check()?;
         check_day(options)?;
@@ -55,6 +56,7 @@ pub fn relight(
                 "or leave out the light"
             },
         )?;
+        (traced_rows, _) = memory::light_room(grid, day, options.memory_bytes - needed(grid));
     }
     let earth = Earth::of(grid, place.as_ref(), options.curvature).map_err(|e| e.about(file.name()))?;
     let threads = Threads::new(options.threads)?;
@@ -97,7 +99,7 @@ pub fn relight(
                 earth: &earth,
                 filter: &filter,
             };
-            let blocks = Blocks::new(file, crests);
+            let blocks = Blocks::new(file, crests, traced_rows);
             let took = write_light(&blocks, &mut writer, &lit, &threads, progress).map_err(named)?;
             report.sun_s += took.sun_s;
             report.sky_s = took.sky_s;

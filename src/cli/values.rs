@@ -5,7 +5,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 #[cfg(feature = "dem")]
 use crate::build::PartKind;
 use crate::grid::Rect;
-use crate::light::{Moment, Sun, SunTime};
+use crate::light::{Moment, Sun};
 use crate::pyramid::FilterKind;
 use crate::source::{Band, RawLayout, SampleType};
 
@@ -112,7 +112,8 @@ pub(super) fn moment(text: &str) -> Result<Moment, String> {
 }
 
 /// A time of day, as 9:30 by the sun or a moment.
-pub(super) fn sun_time(text: &str) -> Result<SunTime, String> {
+#[cfg(feature = "gpu")]
+pub(super) fn sun_time(text: &str) -> Result<crate::light::SunTime, String> {
     text.parse()
 }
 

@@ -93,8 +93,9 @@ pub(super) fn all_rows<T: Copy + Default>(
     Ok(values)
 }
 
-/// Has `task` make the values of every block of `rows`, at most as many as blocks are high and beginning with one. It is
-/// given defaults in rows of [`BLOCK`]`[0]`, of which those within the block are put into `out`, row by row.
+/// Has `task` make the values of every block of `rows`, which begin with one. It is given defaults in rows of
+/// [`BLOCK`]`[0]`, of which those within the block are put into `out`, row by row. Blocks below each other, which look at
+/// much the same ground, come one after another.
 pub(super) fn each_block<T: Copy + Default + Send>(
     relief: &Relief<'_>,
     rows: Range<i64>,
@@ -102,23 +103,27 @@ pub(super) fn each_block<T: Copy + Default + Send>(
     work: &dyn Work,
     task: impl Fn(Rect, &mut Scratch, &mut [T]) -> Result<()> + Sync,
 ) -> Result<()> {
-    debug_assert!(rows.start % BLOCK[1] as i64 == 0 && rows.end - rows.start <= BLOCK[1] as i64);
+    debug_assert_eq!(rows.start % BLOCK[1] as i64, 0);
     let width = relief.grid().size.width;
-    let area = BLOCK[0] * (rows.end - rows.start) as usize;
     let mut blocks = split_columns(out, width as usize, BLOCK[0]);
     let failed = Mutex::new(None);
     each_chunk(work, &mut blocks, 1, |x, out| {
         let x0 = (x * BLOCK[0]) as i64;
-        let block = Rect::new(x0, rows.start, (x0 + BLOCK[0] as i64).min(width), rows.end);
-        let mut values = vec![T::default(); area];
+        let mut values = Vec::new();
         let mut scratch = relief.scratch();
-        if let Err(error) = task(block, &mut scratch, &mut values) {
-            *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+        for (z0, out) in (rows.start..).step_by(BLOCK[1]).zip(out[0].chunks_mut(BLOCK[1])) {
+            let block = Rect::new(x0, z0, (x0 + BLOCK[0] as i64).min(width), z0 + out.len() as i64);
+            values.clear();
+            values.resize(BLOCK[0] * out.len(), T::default());
+            if let Err(error) = task(block, &mut scratch, &mut values) {
+                *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                break;
+            }
+            for (row, values) in out.iter_mut().zip(values.chunks(BLOCK[0])) {
+                row.copy_from_slice(&values[..row.len()]);
+            }
         }
         relief.give_back(scratch);
-        for (row, values) in out[0].iter_mut().zip(values.chunks(BLOCK[0])) {
-            row.copy_from_slice(&values[..row.len()]);
-        }
     });
     failed
         .into_inner()

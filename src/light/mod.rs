@@ -56,7 +56,7 @@ pub use sun_at::Moment;
 /// Sky directions unless others are asked for.
 pub const DEFAULT_SKY_DIRECTIONS: u32 = 16;
 
-/// Rows that are traced together.
+/// Rows of a block, whose light is traced together.
 pub const ROWS: usize = relief::BLOCK[1];
 
 /// What light is traced.

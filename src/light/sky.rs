@@ -95,7 +95,7 @@ impl Skylight {
         }
     }
 
-    /// Its shares (see [`sky_share`]) of `rows`, row by row: at most [`super::ROWS`] of them, beginning with a multiple of that.
+    /// Its shares (see [`sky_share`]) of `rows`, row by row, beginning with a multiple of [`super::ROWS`].
     ///
     /// # Errors
     /// What the ground meets; [`crate::ErrorKind::Cancelled`].

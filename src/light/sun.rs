@@ -158,7 +158,7 @@ impl Sunlight {
         })
     }
 
-    /// Its shares (see [`sun_share`]) of `rows`, row by row: at most [`super::ROWS`] of them, beginning with a multiple of that.
+    /// Its shares (see [`sun_share`]) of `rows`, row by row, beginning with a multiple of [`super::ROWS`].
     ///
     /// # Errors
     /// What the ground meets; [`crate::ErrorKind::Cancelled`].

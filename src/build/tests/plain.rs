@@ -175,3 +175,25 @@ fn any_ceiling_and_any_threads_give_the_bytes_of_the_plain_version() {
     let three = times(&hills, day(3));
     assert!(three != times(&hills, day(4)) && three != times(&holed, day(3)));
 }
+
+#[test]
+fn however_many_rows_are_traced_at_once_the_bytes_are_the_same() {
+    let hills = Hills::new(1000, 3500);
+    let grid = hills.description.grid;
+    let options = |day, memory_bytes| PreprocessOptions {
+        light: Some(LightOptions {
+            sky_directions: 1,
+            ..Default::default()
+        }),
+        day,
+        memory_bytes,
+        ..options(2)
+    };
+    for (day, left) in [(None, 10 << 20), (Some(day(2)), 8 << 20)] {
+        let lowest = preprocess_bytes(&grid, true, day.is_some(), 0);
+        let rows = [0, left].map(|left| memory::light_room(&grid, day.is_some(), left).0);
+        assert!(rows[0] < rows[1], "{rows:?}");
+        let one = streamed(&hills, &options(day, lowest));
+        assert!(one == streamed(&hills, &options(day, lowest + left)), "{day:?}");
+    }
+}

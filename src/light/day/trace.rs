@@ -77,8 +77,7 @@ impl Daylight {
         })
     }
 
-    /// What it is at samples of `rows`, row by row: at most [`super::super::ROWS`] of them, beginning with a multiple of
-    /// that.
+    /// What it is at samples of `rows`, row by row, beginning with a multiple of [`super::super::ROWS`].
     ///
     /// # Errors
     /// What the ground meets; [`crate::ErrorKind::Cancelled`].
