@@ -34,9 +34,9 @@ const BYTES_A_COLUMN_WITH_LIGHT: u64 = 5632;
 const BYTES_A_COLUMN_WITH_DAY: u64 = 10_240;
 
 /// Bytes a tile of level 0 takes: its place in the file and its checks, twice, and those of the tiles above it; with light
-/// its crests too (256), and coarser ones thrice while windows are made of them (192).
+/// its crests too (256).
 const BYTES_A_TILE: u64 = 64;
-const BYTES_A_TILE_WITH_LIGHT: u64 = 512;
+const BYTES_A_TILE_WITH_LIGHT: u64 = 320;
 
 /// What does not depend on the DEM: the program, and tiles being compressed; with light the crossings of its rays with
 /// cell edges (25 MiB), the terrain that blocks look at, and the tiles that are kept at least.
@@ -211,8 +211,8 @@ mod tests {
     fn the_height_of_a_dem_costs_next_to_nothing() {
         for (light, day, a_tile, fixed, a_column) in [
             (false, false, 64, 64 << 20, 4096),
-            (true, false, 512, 120 << 20, 5632),
-            (true, true, 512, 120 << 20, 10_240),
+            (true, false, 320, 120 << 20, 5632),
+            (true, true, 320, 120 << 20, 10_240),
         ] {
             let of = |width, height| preprocess_bytes(&Grid::new(width, height, [1.0, 1.0]), light, day, 7);
             assert_eq!(of(1000, 1 << 20) - of(1000, 1), (1000 << 20) / 65_536 * a_tile);

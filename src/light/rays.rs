@@ -116,9 +116,9 @@ impl Rays {
         ((1.0 / t) as f32, drop + self.slack)
     }
 
-    /// All samples that rays of `block` meet from stage `k` on in `count` stages.
-    pub(super) fn swept(&self, k: i64, count: i64, block: Rect) -> Rect {
-        let ends = [k, k + count].map(|k| {
+    /// All samples that rays of `block` meet in stage `k`.
+    pub(super) fn swept(&self, k: i64, block: Rect) -> Rect {
+        let ends = [k, k + 1].map(|k| {
             [0, 1].map(|axis: usize| {
                 let cells = (k * STAGE) as f64 * self.rates[axis] / self.rates[self.along].abs();
                 cells.clamp(-(2.0 * MAX_SIZE as f64), 2.0 * MAX_SIZE as f64) as i64
@@ -249,7 +249,7 @@ mod tests {
                     assert!(crossing.per_m <= last);
                     last = crossing.per_m;
                 }
-                let swept = kept.swept(k, 1, Rect::new(0, 0, 1, 1));
+                let swept = kept.swept(k, Rect::new(0, 0, 1, 1));
                 for run in &a.runs {
                     assert!(swept.contains_rect(run.hull), "{azimuth_deg}: {:?}", run.hull);
                     assert!(k == 0 || run.per_m <= kept.beyond(k).0 && run.drop >= kept.beyond(k).1);

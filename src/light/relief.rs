@@ -2,9 +2,9 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::crests::{CrestWindows, Crests};
+use super::crests::Crests;
 use super::sight::Sight;
-use super::stage::{STAGE, STRIDE};
+use super::stage::STRIDE;
 use crate::error::Result;
 use crate::grid::{Grid, Rect};
 
@@ -56,11 +56,7 @@ impl Ground for Whole<'_> {
 pub struct Relief<'a> {
     grid: Grid,
     ground: &'a dyn Ground,
-    /// The greatest height; minus infinity where all is void.
-    pub(super) greatest: f32,
     pub(super) crests: Crests,
-    /// Over stages.
-    pub(super) stages: CrestWindows,
     /// What is not in use.
     scratches: Mutex<Vec<Scratch>>,
 }
@@ -90,8 +86,6 @@ impl<'a> Relief<'a> {
         Self {
             grid: *grid,
             ground,
-            greatest: crests.greatest(),
-            stages: crests.windows(STAGE),
             crests,
             scratches: Mutex::default(),
         }
@@ -157,57 +151,4 @@ pub(super) fn lanes_mut(values: &mut [f32], at: usize) -> &mut [f32; LANES] {
 /// The greater of two; `most` where the other is no number.
 pub(super) fn greater(most: f32, other: f32) -> f32 {
     if other > most { other } else { most }
-}
-
-/// The greatest of `count` values from each on, fewer at the end, down columns or along rows of `width`.
-pub(super) fn slide(values: &[f32], width: usize, down: bool, count: usize) -> Vec<f32> {
-    let mut values = values.to_vec();
-    let (stride, length) = if down { (width, values.len()) } else { (1, width) };
-    for values in values.chunks_mut(length) {
-        // Windows of 1, 2, 4, ... values, then two of the largest that together are `count`.
-        let mut done = 1;
-        while done < count && done * stride < length {
-            let by = done.min(count - done);
-            // In pieces that do not reach into what they read: vectorised.
-            let mut at = 0;
-            while at + by * stride < length {
-                let (here, there) = values[at..].split_at_mut(by * stride);
-                here.iter_mut()
-                    .zip(&*there)
-                    .for_each(|(most, &h)| *most = greater(*most, h));
-                at += by * stride;
-            }
-            done += by;
-        }
-    }
-    values
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::pyramid::random::Random;
-
-    #[test]
-    fn windows_slide_over_all_that_they_hold() {
-        let mut random = Random::new(5);
-        for _ in 0..200 {
-            let (width, height) = (1 + random.below(40) as usize, 1 + random.below(30) as usize);
-            let (count, down) = (1 + random.below(20) as usize, random.unit() < 0.5);
-            let values = random.heights((width * height) as i64, -1.0, 1.0, 0.0);
-            let got = slide(&values, width, down, count);
-            for (at, &got) in got.iter().enumerate() {
-                let (x, z) = (at % width, at / width);
-                let held = (0..count).filter_map(|k| {
-                    let (x, z) = if down { (x, z + k) } else { (x + k, z) };
-                    (x < width && z < height).then(|| values[z * width + x])
-                });
-                assert_eq!(
-                    got,
-                    held.fold(f32::NEG_INFINITY, f32::max),
-                    "{width} x {height}, {count}"
-                );
-            }
-        }
-    }
 }

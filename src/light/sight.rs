@@ -23,9 +23,8 @@ use super::tops::Tops;
 use crate::error::Result;
 use crate::grid::Rect;
 
-/// Stages at which all samples look, and how many farther ones are asked for together whether any need.
+/// Stages at which all samples look.
 const NEAR: i64 = 2;
-const FAR: i64 = 8;
 
 /// What a block looks at: reused from block to block.
 #[derive(Default)]
@@ -37,6 +36,16 @@ pub(super) struct Sight {
     open: Vec<u32>,
     near: Vec<u32>,
     looking: Vec<u32>,
+    far: Vec<Far>,
+}
+
+/// A stage that is not near.
+#[derive(Clone, Copy)]
+struct Far {
+    k: i64,
+    /// Its highest ground, and the greatest tangent at which any of the block could see it.
+    most: f32,
+    tangent: f32,
 }
 
 /// Who looks where.
@@ -85,50 +94,46 @@ impl Relief<'_> {
         for k in 0..rays.stages().min(NEAR) {
             self.look(&block, k, tangents, sight)?;
         }
-        if let Some(k) = self.highest_stage(&block, &sight.open) {
-            sight.near.clone_from(&sight.open);
-            self.look(&block, k, tangents, sight)?;
-        }
-        for k in NEAR..rays.stages() {
-            if (k - NEAR) % FAR == 0 {
-                // Which of them need look at any of the next stages at all.
-                let (per_m, drop) = rays.beyond(k);
-                let most = self.stages.over(rays.swept(k, FAR, block.rect));
-                let Sight { open, near, .. } = sight;
-                near.clear();
-                open.retain(|&group| {
-                    if block.could_rise(group, most, per_m, drop, tangents) {
-                        near.push(group);
-                    }
-                    // What the highest ground cannot raise from here, none will from farther out.
-                    block.could_rise(group, self.greatest, per_m, drop, tangents)
-                });
-                if open.is_empty() {
-                    break;
+        self.rank(&block, sight);
+        for at in 0..sight.far.len() {
+            let Far { k, most, tangent } = sight.far[at];
+            let (per_m, drop) = rays.beyond(k);
+            let Sight { open, near, .. } = sight;
+            near.clear();
+            open.retain(|&group| {
+                if block.could_rise(group, most, per_m, drop, tangents) {
+                    near.push(group);
                 }
+                // Of the stages that are left none stands higher over any of the block.
+                lanes(tangents, group as usize * LANES)
+                    .iter()
+                    .any(|&least| least < tangent)
+            });
+            if open.is_empty() {
+                break;
             }
             self.look(&block, k, tangents, sight)?;
         }
         Ok(())
     }
 
-    /// Of the stages that are not near, that whose highest ground stands highest over the middle one of `groups`, if
-    /// any.
-    fn highest_stage(&self, block: &Block<'_>, groups: &[u32]) -> Option<i64> {
-        let middle = *groups.get(groups.len() / 2)?;
-        let h = block
-            .heights(middle)
-            .iter()
-            .fold(f32::INFINITY, |h, &other| h.min(other));
-        let tangent = |k: i64| {
+    /// Finds the stages that are not near and how high their ground may stand over the block's lowest open sample, the
+    /// highest first: what they raise leaves the fewest of the others to be looked at.
+    fn rank(&self, block: &Block<'_>, sight: &mut Sight) {
+        let lowest = |group: &u32| block.heights(*group).iter().fold(f32::INFINITY, |l, &h| l.min(h));
+        let h = sight.open.iter().map(lowest).fold(f32::INFINITY, f32::min);
+        let far = |k: i64| {
             let (per_m, drop) = block.rays.beyond(k);
-            (self.stages.over(block.rays.swept(k, 1, block.rect)) - h) * per_m - drop
+            let most = self.crests.over(block.rays.swept(k, block.rect));
+            let tangent = (most - h) * per_m - drop;
+            Far { k, most, tangent }
         };
-        (NEAR..block.rays.stages())
-            .map(|k| (k, tangent(k)))
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .filter(|(_, tangent)| *tangent > 0.0)
-            .map(|(k, _)| k)
+        sight.far.clear();
+        sight.far.extend((NEAR..block.rays.stages()).map(far));
+        sight.far.retain(|far| far.tangent > 0.0);
+        sight
+            .far
+            .sort_unstable_by(|a, b| b.tangent.total_cmp(&a.tangent).then(a.k.cmp(&b.k)));
     }
 
     /// Has the groups of `sight.near` look at stage `k`.
