@@ -79,24 +79,6 @@ impl Readback {
 }
 
 impl Gpu {
-    /// A texture of one sample a pixel to draw into and to read back.
-    pub fn target(&self, label: &str, size_px: [u32; 2], format: wgpu::TextureFormat) -> wgpu::Texture {
-        self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d {
-                width: size_px[0],
-                height: size_px[1],
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        })
-    }
-
     /// Reads back layer `layer` of a texture: its rows without padding.
     ///
     /// # Errors

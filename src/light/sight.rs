@@ -94,6 +94,9 @@ impl Relief<'_> {
         for k in 0..rays.stages().min(NEAR) {
             self.look(&block, k, tangents, sight)?;
         }
+        if sight.open.is_empty() {
+            return Ok(());
+        }
         self.rank(&block, sight);
         for at in 0..sight.far.len() {
             let Far { k, most, tangent } = sight.far[at];

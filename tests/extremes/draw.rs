@@ -2,7 +2,7 @@
 
 use clipscape::camera::Camera;
 use clipscape::clipmap::ClipmapOptions;
-use clipscape::gpu::{ClipmapRenderer, Gpu, RendererOptions, ViewTextures};
+use clipscape::gpu::{ClipmapRenderer, Gpu, RendererOptions, Targets, ViewTextures};
 use clipscape::levels::Levels;
 use clipscape::light::Sun;
 use clipscape::render::{Headless, HeadlessOptions};
@@ -60,8 +60,7 @@ pub(crate) fn frame(headless: &mut Headless, levels: &dyn Levels, camera: &Camer
 pub(crate) struct Floats {
     renderer: ClipmapRenderer,
     textures: ViewTextures,
-    colour: wgpu::Texture,
-    depth: wgpu::TextureView,
+    targets: Targets,
     /// Red of the pixels that show no terrain.
     pub(crate) background: f64,
 }
@@ -69,7 +68,6 @@ pub(crate) struct Floats {
 impl Floats {
     pub(crate) fn new(headless: &Headless, size_px: [u32; 2]) -> Self {
         let device = &headless.gpu().device;
-        let target = |format| headless.gpu().target("clipscape test floats", size_px, format);
         let options = RendererOptions {
             colour_format: wgpu::TextureFormat::Rgba16Float,
             traced_light: headless.clipmap().has_light(),
@@ -81,8 +79,7 @@ impl Floats {
                 .textures(device, headless.clipmap(), Sun::default())
                 .unwrap(),
             renderer,
-            colour: target(wgpu::TextureFormat::Rgba16Float),
-            depth: target(options.depth_format).create_view(&Default::default()),
+            targets: Targets::new(headless.gpu(), size_px, &options),
             background: 0.0,
         }
     }
@@ -94,7 +91,8 @@ impl Floats {
         self.renderer
             .upload(&mut encoder, headless.clipmap(), &mut self.textures)
             .unwrap();
-        let view = self.colour.create_view(&Default::default());
+        let [view, depth] =
+            [self.targets.colour(), self.targets.depth()].map(|t| t.create_view(&Default::default()));
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: &view,
@@ -109,7 +107,7 @@ impl Floats {
                 },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.depth,
+                view: &depth,
                 depth_ops: Some(wgpu::Operations {
                     load: wgpu::LoadOp::Clear(0.0),
                     store: wgpu::StoreOp::Store,
@@ -123,7 +121,7 @@ impl Floats {
             .unwrap();
         drop(pass);
         gpu.queue.submit([encoder.finish()]);
-        let bytes = gpu.read_texture(&self.colour, 0).unwrap();
+        let bytes = gpu.read_texture(self.targets.colour(), 0).unwrap();
         let texels: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
         let fit = |channel: &u16| (0.0..=1.0).contains(&f16::from_bits(*channel).to_f32());
         texels.iter().filter(|texel| !texel.iter().all(fit)).count()
